@@ -1,0 +1,44 @@
+# Every target sets up what it needs; `make setup` costs a second when it is done.
+SHELL := /bin/sh
+VENV := .venv/bin
+SETUP := .venv/set-up
+NAME ?= fur
+
+.PHONY: help setup demo test test-slow ui bench lint docs doctor
+
+help:            ## this list
+	@grep -E '^[a-z-]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*## */\t/' | sort
+
+setup: $(SETUP)  ## system libraries, .venv, .env, dagster.yaml
+
+$(SETUP): pyproject.toml constraints.txt setup/system_libraries.sh setup/make_environment.sh
+	@setup/system_libraries.sh
+	@echo "Setting up .venv (two minutes or so, once) …"
+	@setup/make_environment.sh
+	@touch $@
+
+demo: setup      ## every system's examples, their pictures under pictures/
+	@$(VENV)/tsuya demo
+
+test: setup      ## all tests but the paper-size ones
+	@$(VENV)/python -m pytest -q
+
+test-slow: setup ## the paper-size tests
+	@$(VENV)/python -m pytest -q -m slow
+
+ui: setup        ## the Dagster web UI on http://127.0.0.1:3000
+	@set -a && . ./.env && $(VENV)/dagster dev -w workspace.yaml -h 127.0.0.1 -p 3000
+
+bench: setup     ## a benchmark: make bench NAME=fur
+	@$(VENV)/python -m benchmarks $(NAME)
+
+lint: setup      ## ruff and mypy
+	@$(VENV)/ruff check .
+	@$(VENV)/ruff format --check .
+	@$(VENV)/mypy
+
+docs: setup      ## docs/assets.md from the schemas
+	@$(VENV)/python -m docs.generate
+
+doctor: setup    ## check this machine and draw one picture
+	@$(VENV)/tsuya doctor

@@ -1,0 +1,102 @@
+"""Code versions that nobody has to remember to raise.
+
+An asset's code version is the hash of its own function and of every module of `pipelines` and of
+`storage.readers` that it imports, directly or through others. The hash is over syntax trees without
+docstrings: a comment or a docstring changes no version.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeGuard
+
+PROJECT = Path(__file__).resolve().parent.parent
+_HASHED_PACKAGES = ("pipelines", "storage.readers")
+_DIGITS = 16
+
+
+def code_version(*functions: Callable[..., Any]) -> str:
+    """Hash of the functions' sources and of the project's numerics and readers below them."""
+    own: dict[str, str] = {}
+    modules: set[str] = set()
+    for function in functions:
+        _gather(function, own, modules)
+    parts = [f"{name}:{text}" for name, text in sorted(own.items())]
+    parts += [f"{name}:{_dump(_tree(name))}" for name in sorted(modules)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_DIGITS]
+
+
+def _gather(function: Callable[..., Any], own: dict[str, str], modules: set[str]) -> None:
+    """Add a function, the functions of its module that it names, and the modules it reaches."""
+    name = f"{function.__module__}.{function.__qualname__}"
+    if name in own:
+        return
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    own[name] = _dump(tree)
+    for module in _imports(tree):
+        modules |= _reached(module)
+    for node in ast.walk(tree):
+        value = inspect.unwrap(function).__globals__.get(node.id) if _is_name(node) else None
+        home = getattr(value, "__name__" if inspect.ismodule(value) else "__module__", None)
+        if isinstance(home, str) and home.startswith(_HASHED_PACKAGES):
+            modules |= _reached(home)
+        elif inspect.isfunction(value) and home == function.__module__:
+            _gather(value, own, modules)
+
+
+def _is_name(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name)
+
+
+def _imports(tree: ast.AST) -> Iterator[str]:
+    """Dotted names of the hashed packages' modules that a tree imports."""
+    for node in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        for name in names:
+            if name.startswith(_HASHED_PACKAGES) and _path(name) is not None:
+                yield name
+
+
+def _reached(name: str) -> set[str]:
+    reached: set[str] = set()
+    waiting = [name]
+    while waiting:
+        module = waiting.pop()
+        if module not in reached:
+            reached.add(module)
+            waiting.extend(_imports(_tree(module)))
+    return reached
+
+
+def _path(name: str) -> Path | None:
+    base = PROJECT.joinpath(*name.split("."))
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if path.is_file():
+            return path
+    return None
+
+
+@functools.cache
+def _tree(name: str) -> ast.Module:
+    path = _path(name)
+    assert path is not None
+    return ast.parse(path.read_text())
+
+
+def _dump(tree: ast.Module) -> str:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                node.body = node.body[1:]
+    return ast.dump(tree)

@@ -1,0 +1,65 @@
+"""Everything that Dagster sees, built by one function."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import dagster as dg
+
+from assets_defs.inbox import inbox_sensor
+from assets_defs.photo_fur import FUR
+from assets_defs.rematerialisation import daily_schedule, launch_job
+from assets_defs.system import System
+from assets_defs.workspace import Workspace
+from storage.io_manager import ZarrIOManager
+
+SYSTEMS: dict[str, System] = {system.name: system for system in (FUR,)}
+
+
+def build_definitions(
+    workspace: Workspace | None = None, resources: Mapping[str, Any] | None = None
+) -> dg.Definitions:
+    """All systems' assets, checks, jobs, schedule and sensor.
+
+    ``workspace`` is where data lie, by default the environment's; ``resources`` replace those of
+    the same names.
+    """
+    place = workspace or Workspace.from_environment()
+    provided: dict[str, Any] = {
+        "workspace": place,
+        "io_manager": ZarrIOManager(place.store),
+        "progress": _silent,
+        **(resources or {}),
+    }
+    assets, checks, jobs = [], [], []
+    for system in SYSTEMS.values():
+        assets += [item for item in system.definitions if isinstance(item, dg.AssetsDefinition)]
+        checks += [
+            item for item in system.definitions if isinstance(item, dg.AssetChecksDefinition)
+        ]
+        jobs += [_grain_job(system, by) for by in system.grains()]
+    launch = launch_job(SYSTEMS)
+    return dg.Definitions(
+        assets=assets,
+        asset_checks=checks,
+        jobs=[*jobs, launch],
+        schedules=[daily_schedule(launch)],
+        sensors=[inbox_sensor(launch, SYSTEMS, place)],
+        resources=provided,
+        executor=dg.in_process_executor,
+    )
+
+
+def _grain_job(system: System, by: tuple[str, ...]) -> Any:
+    names = [plan.name for plan in system.plans.values() if plan.by == by]
+    return dg.define_asset_job(
+        system.job_name(by),
+        selection=dg.AssetSelection.assets(*([system.name, name] for name in names)),
+        partitions_def=system.partitions(by),
+        description=f"{system.title}: {', '.join(names)} of one {' x '.join(by)}.",
+    )
+
+
+def _silent(what: str, fraction: float) -> None:
+    """The web UI has its own display of a run's progress."""

@@ -1,0 +1,40 @@
+"""Pictures and tables for the web UI's metadata."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import dagster as dg
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MOST_BYTES = 100_000
+_WIDEST = 512
+
+
+def thumbnail(picture: NDArray[np.uint8]) -> dg.MarkdownMetadataValue:
+    """A picture (y, x) or (y, x, 3) as a Markdown data URI of at most 100 kB."""
+    from PIL import Image
+
+    image = Image.fromarray(picture)
+    side = _WIDEST
+    while True:
+        small = image.copy()
+        small.thumbnail((side, side))
+        file = io.BytesIO()
+        small.convert("RGB").save(file, "JPEG", quality=85)
+        if file.tell() <= MOST_BYTES * 3 // 4:
+            break
+        side = side * 3 // 4
+    data = base64.b64encode(file.getvalue()).decode()
+    return dg.MetadataValue.md(f"![picture](data:image/jpeg;base64,{data})")
+
+
+def table(rows: Sequence[Mapping[str, int | float | str]]) -> dg.TableMetadataValue:
+    """Rows of equal columns as a table."""
+    return dg.MetadataValue.table(records=[dg.TableRecord(dict(row)) for row in rows])

@@ -1,0 +1,65 @@
+"""The job that launches whole graphs, and the schedule that does so every day.
+
+A tick cannot order grains, so it requests one run of the job `launch`, which calls the launcher;
+the grain runs execute in that process, on the same instance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import dagster as dg
+from pydantic import Field
+
+from assets_defs.launcher import Launcher, Request
+from assets_defs.system import System
+
+
+class LaunchConfig(dg.Config):
+    """What to launch."""
+
+    system: str = Field(description="Name of the system; empty: all of them")
+    partitions: list[dict[str, str]] = Field(
+        [], description="Keys by dimension; empty: everything that was ever made"
+    )
+    force: bool = Field(False, description="Also run what is current")
+
+
+def launch_job(systems: Mapping[str, System]) -> dg.JobDefinition:
+    """The job `launch`: one op that runs graphs grain by grain."""
+
+    @dg.op(required_resource_keys={"workspace", "progress"})
+    def launch_graph(context: dg.OpExecutionContext, config: LaunchConfig) -> None:
+        workspace, progress = context.resources.workspace, context.resources.progress
+        definitions = context.repository_def
+        launcher = Launcher(context.instance, workspace, definitions.get_job, progress)
+        chosen = [systems[config.system]] if config.system else list(systems.values())
+        for system in chosen:
+            partitions = config.partitions or system.made(workspace.store)
+            for outcome in launcher.launch(Request(system, partitions, force=config.force)):
+                context.log.info(f"{outcome.slot}: {outcome.state}")
+
+    @dg.job(
+        name="launch",
+        description="Runs a system's graph grain by grain; what is current is skipped.",
+        executor_def=dg.in_process_executor,
+    )
+    def launch() -> None:
+        launch_graph()
+
+    return launch
+
+
+def daily_schedule(job: dg.JobDefinition) -> dg.ScheduleDefinition:
+    """Every night, everything that was ever made is made again with its own settings.
+
+    Forced: it recomputes and re-runs the checks, so a regression shows in the morning.
+    """
+    return dg.ScheduleDefinition(
+        name="daily_rematerialisation",
+        job=job,
+        cron_schedule="0 3 * * *",
+        run_config=dg.RunConfig(ops={"launch_graph": LaunchConfig(system="", force=True)}),
+        default_status=dg.DefaultScheduleStatus.RUNNING,
+        description="Makes everything again that was ever made, and re-runs its checks.",
+    )

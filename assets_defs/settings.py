@@ -1,0 +1,90 @@
+"""Settings of assets: typed, with presets, remembered by the versions that they made.
+
+A system declares plain pydantic classes. Dagster gets a config class with the same fields, all
+optional, and ``preset``: what is not given comes from the current version's settings, so a
+rematerialisation repeats what was there; without a current version it comes from the preset.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Mapping
+from types import UnionType
+from typing import Any, ClassVar, Literal, Self, Union
+
+import dagster as dg
+import pydantic
+
+Preset = Literal["test", "demo", "paper"]
+PRESETS: tuple[Preset, ...] = typing.get_args(Preset)
+DEFAULT_PRESET: Preset = "demo"
+
+
+class SettingsError(ValueError):
+    """A setting is outside what it may be; the text is one sentence."""
+
+
+class Settings(pydantic.BaseModel):
+    """Base of an asset's settings. Field defaults are the preset `demo`."""
+
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid")
+    sizes: ClassVar[Mapping[Preset, Mapping[str, Any]]] = {}
+    """What the other presets have different."""
+
+    @classmethod
+    def preset(cls, name: Preset, keys: Mapping[str, str]) -> Self:
+        """The settings of a preset for a partition (``{"photo": "grass"}``)."""
+        return cls(**cls.sizes.get(name, {}))
+
+
+def resolve(
+    settings: type[Settings],
+    asset: str,
+    keys: Mapping[str, str],
+    *,
+    preset: str | None,
+    given: Mapping[str, Any],
+    current: Mapping[str, Any] | None,
+) -> Settings:
+    """Settings for one materialisation. Raises SettingsError.
+
+    ``given`` wins over ``preset``, which wins over the ``current`` version's settings.
+    """
+    if preset is not None and preset not in PRESETS:
+        raise SettingsError(f"preset is {preset!r}; expected one of {', '.join(PRESETS)}.")
+    name = typing.cast(Preset, preset or DEFAULT_PRESET)
+    base = settings.preset(name, keys).model_dump()
+    if preset is None and current is not None:
+        base |= {field: value for field, value in current.items() if field in base}
+    try:
+        return settings(**(base | given))
+    except pydantic.ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"]) or "settings"
+        problem = first["msg"].removeprefix("Value error, ")
+        expected = problem[0].lower() + problem[1:]
+        raise SettingsError(
+            f"{asset}: setting {field!r} is {first['input']!r}; {expected}."
+        ) from error
+
+
+def config_class(settings: type[Settings]) -> type[dg.Config]:
+    """The Dagster config of a settings class: `preset` and every field, all optional."""
+    fields: dict[str, Any] = {"preset": (str | None, pydantic.Field(default=None))}
+    for name, field in settings.model_fields.items():
+        about = pydantic.Field(default=None, description=field.description)
+        fields[name] = (_plain_type(field.annotation) | None, about)
+    made = pydantic.create_model(f"{settings.__name__}Config", __base__=dg.Config, **fields)
+    return typing.cast(type[dg.Config], made)
+
+
+def _plain_type(annotation: Any) -> Any:
+    """The type as Dagster's config system knows it."""
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Literal:
+        return str
+    if origin is tuple:
+        return list[arguments[0]]  # type: ignore[valid-type]
+    if origin in (Union, UnionType):
+        return _plain_type(next(kind for kind in arguments if kind is not type(None)))
+    return annotation

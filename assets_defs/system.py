@@ -1,0 +1,390 @@
+"""What a system is made of: dimensions, assets with their checks, defaults.
+
+A system module declares one ``System`` and decorates plain functions with ``system.asset``. The
+function gets its inputs as lazy datasets by name and returns a dataset with metadata; everything
+around it (partitions, settings, provenance, checks, retries, errors) is done here, once.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import itertools
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import dagster as dg
+
+from assets_defs.checks import Check, build_check
+from assets_defs.code_version import code_version
+from assets_defs.pictures import thumbnail
+from assets_defs.settings import Settings, config_class, resolve
+from assets_defs.workspace import Workspace
+from storage.errors import SchemaError
+from storage.schemas import Schema
+from storage.slugs import slug
+from storage.versions import WHOLE, Slot, VersionedStore
+from storage.zarr_files import RECORD
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+Metadata = Mapping[str, Any]
+Pictures = Callable[["xr.Dataset"], "Mapping[str, NDArray[np.uint8]]"]
+"""Pictures (y, x, 3) of a dataset by name, for the web UI and the gallery."""
+Progress = Callable[[str, float], None]
+"""Told what is being done and the fraction that is done."""
+
+RETRIES = dg.RetryPolicy(max_retries=2, delay=1)
+OWNERS = ("team:tsuya",)
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """What a system's assets are partitioned by: its photographs, its meshes …"""
+
+    name: str
+    builtin: tuple[str, ...]
+    """Keys that need no file."""
+    default: str
+    """What a dropped item of another dimension is combined with."""
+    suffixes: tuple[str, ...]
+    """Endings of this dimension's files in the inbox, lower case."""
+    read: Callable[[Path], object]
+    """Reads a file; raises ValueError for one that cannot be used."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a partition's first asset is made from: a user's file, or something built in."""
+
+    key: str
+    path: Path | None
+
+    @property
+    def name(self) -> str:
+        """The name that people know it by."""
+        return self.key if self.path is None else self.path.name
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the file's bytes; of a built-in item, its key."""
+        if self.path is None:
+            return f"built-in:{self.key}"
+        with self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class AssetPlan:
+    """What the launcher and the decorator know of one asset."""
+
+    schema: Schema
+    by: tuple[str, ...]
+    settings: type[Settings]
+    inputs: tuple[str, ...]
+    from_source: bool
+    checks: tuple[Check, ...]
+    pictures: Pictures | None
+    code: str
+
+    @property
+    def name(self) -> str:
+        """The asset's name inside its system."""
+        return self.schema.asset
+
+
+@dataclass
+class System:
+    """One system: a group of assets in the graph."""
+
+    name: str
+    title: str
+    dimensions: tuple[Dimension, ...]
+    plans: dict[str, AssetPlan] = field(default_factory=dict)
+    """In the order of declaration: inputs come before what is made from them."""
+    definitions: list[dg.AssetsDefinition | dg.AssetChecksDefinition] = field(default_factory=list)
+
+    # ---- partitions and sources --------------------------------------------------------------
+
+    def dimension(self, name: str) -> Dimension:
+        """A dimension by its name."""
+        return next(dimension for dimension in self.dimensions if dimension.name == name)
+
+    def dynamic(self, dimension: str) -> dg.DynamicPartitionsDefinition:
+        """Dagster's partitions of one dimension; their name is unique among all systems."""
+        return dg.DynamicPartitionsDefinition(name=f"{self.name}_{dimension}")
+
+    def partitions(self, by: Sequence[str]) -> dg.PartitionsDefinition[str]:
+        """Dagster's partitions of a grain."""
+        if len(by) == 1:
+            return self.dynamic(by[0])
+        return dg.MultiPartitionsDefinition({name: self.dynamic(name) for name in by})
+
+    def grains(self) -> list[tuple[str, ...]]:
+        """The different partitionings, in an order in which they can be run."""
+        return list(dict.fromkeys(plan.by for plan in self.plans.values()))
+
+    def job_name(self, by: Sequence[str]) -> str:
+        """Name of the job that runs a grain."""
+        return "_".join((self.name, *by))
+
+    def sources(self, dimension: str, inbox: Path) -> dict[str, Source]:
+        """Everything that a dimension has: built-in items and files in the inbox, by key.
+
+        Raises ValueError where two of them would have the same key.
+        """
+        chosen = self.dimension(dimension)
+        found = {key: Source(key, None) for key in chosen.builtin}
+        for path in self.files(dimension, inbox):
+            key = slug(path.stem)
+            if key in found:
+                raise ValueError(
+                    f"{path}: name is taken by {found[key].path or 'a built-in item'}; "
+                    f"expected a {dimension} with a name of its own."
+                )
+            found[key] = Source(key, path)
+        return found
+
+    def files(self, dimension: str, inbox: Path) -> list[Path]:
+        """The dimension's files in the inbox."""
+        suffixes = self.dimension(dimension).suffixes
+        if not inbox.is_dir():
+            return []
+        return sorted(p for p in inbox.iterdir() if p.suffix.lower() in suffixes)
+
+    def span(self, wanted: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
+        """The cross product of keys by dimension."""
+        names = list(wanted)
+        return [dict(zip(names, keys, strict=True)) for keys in itertools.product(*wanted.values())]
+
+    def made(self, store: VersionedStore) -> list[dict[str, str]]:
+        """Every partition that has a current version of some asset, as keys by dimension."""
+        found = []
+        for slot in store.slots():
+            if slot.system == self.name and slot.asset in self.plans:
+                by = sorted(self.plans[slot.asset].by)
+                found.append(dict(zip(by, slot.partition.split("."), strict=True)))
+        return found
+
+    def slot(self, asset: str, keys: Mapping[str, str]) -> Slot:
+        """Where an asset's partition is stored; several keys are joined in the order of names."""
+        return Slot(self.name, asset, partition_folder(keys))
+
+    # ---- provenance --------------------------------------------------------------------------
+
+    def resolve(
+        self,
+        asset: str,
+        keys: Mapping[str, str],
+        store: VersionedStore,
+        *,
+        preset: str | None,
+        given: Mapping[str, Any],
+    ) -> Settings:
+        """An asset's settings for a partition. Raises SettingsError."""
+        slot = self.slot(asset, keys)
+        has_current = store.pointer(slot).version is not None
+        return resolve(
+            self.plans[asset].settings,
+            asset,
+            keys,
+            preset=preset,
+            given=given,
+            current=store.record(slot)["settings"] if has_current else None,
+        )
+
+    def source_of(
+        self, plan: AssetPlan, keys: Mapping[str, str], inbox: Path
+    ) -> Source | None:
+        """The source of an asset that has one. Raises ValueError where it is gone."""
+        if not plan.from_source:
+            return None
+        (dimension,) = plan.by
+        sources = self.sources(dimension, inbox)
+        if keys[dimension] not in sources:
+            raise ValueError(
+                f"{inbox}: {dimension} {keys[dimension]!r} is not there; "
+                f"expected one of {', '.join(sources)}."
+            )
+        return sources[keys[dimension]]
+
+    # ---- assets ------------------------------------------------------------------------------
+
+    def asset(
+        self,
+        schema: Schema,
+        *,
+        by: tuple[str, ...],
+        settings: type[Settings],
+        inputs: tuple[str, ...] = (),
+        from_source: bool = False,
+        kinds: frozenset[str] = frozenset({"zarr"}),
+        checks: tuple[Check, ...] = (),
+        pictures: Pictures | None = None,
+    ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+        """Declare an asset; the decorated function stays callable by itself.
+
+        It is called with ``settings``, then whichever it names of ``source`` (for an asset made
+        from one), ``keys`` (the partition), ``progress`` (a function of the fraction done) and
+        its inputs, and returns ``(dataset, metadata)``.
+        """
+
+        def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+            figures = [check.figure for check in checks]
+            plan = AssetPlan(
+                schema,
+                by,
+                settings,
+                inputs,
+                from_source,
+                checks,
+                pictures,
+                code_version(function, *figures),
+            )
+            self.plans[plan.name] = plan
+            asset = self._dagster_asset(plan, function, kinds)
+            self.definitions.append(asset)
+            for check in checks:
+                self.definitions.append(build_check(check, asset, self._slot_of(plan)))
+            return function
+
+        return declare
+
+    def _slot_of(self, plan: AssetPlan) -> Callable[[Any], Slot]:
+        return lambda context: self.slot(plan.name, partition_keys(context, plan.by))
+
+    def _dagster_asset(
+        self, plan: AssetPlan, function: Callable[..., Any], kinds: frozenset[str]
+    ) -> dg.AssetsDefinition:
+        def compute(context, config, **inputs):  # type: ignore[no-untyped-def]
+            return self._materialise(plan, function, context, config, inputs)
+
+        compute.__annotations__ = {
+            "context": dg.AssetExecutionContext,
+            "config": config_class(plan.settings),
+        }
+        return dg.asset(
+            compute,
+            key=[self.name, plan.name],
+            ins={name: dg.AssetIn(key=[self.name, name]) for name in plan.inputs},
+            partitions_def=self.partitions(plan.by),
+            group_name=self.name,
+            kinds=set(kinds),
+            owners=list(OWNERS),
+            description=f"{plan.schema.meaning}\n\n{plan.schema.markdown()}",
+            metadata={
+                "dagster/column_schema": dg.TableSchema(
+                    columns=[
+                        dg.TableColumn(name, variable.dtype, variable.meaning)
+                        for name, variable in plan.schema.variables.items()
+                    ]
+                ),
+                "schema number": plan.schema.number,
+            },
+            code_version=plan.code,
+            retry_policy=RETRIES,
+            required_resource_keys={"workspace", "progress"},
+            io_manager_key="io_manager",
+        )
+
+    def _materialise(
+        self,
+        plan: AssetPlan,
+        function: Callable[..., Any],
+        context: dg.AssetExecutionContext,
+        config: dg.Config,
+        inputs: dict[str, xr.Dataset],
+    ) -> dg.Output[xr.Dataset]:
+        keys = partition_keys(context, plan.by)
+        given = {name: value for name, value in config.model_dump().items() if value is not None}
+        preset = given.pop("preset", None)
+        try:
+            workspace: Workspace = context.resources.workspace
+            settings = self.resolve(plan.name, keys, workspace.store, preset=preset, given=given)
+            source = self.source_of(plan, keys, workspace.inbox(self.name))
+            what = f"{plan.name} [{', '.join(keys.values())}]"
+            progress = functools.partial(context.resources.progress, what)
+            progress(0.0)
+            offered = {
+                "settings": settings,
+                "source": source,
+                "keys": keys,
+                "progress": progress,
+                **inputs,
+            }
+            named = inspect.signature(function).parameters
+            dataset, metadata = function(**{name: offered[name] for name in named})
+        except (ValueError, SchemaError) as error:
+            # What the user gave cannot work: a second try would not either.
+            raise dg.Failure(description=str(error), allow_retries=False) from error
+        records = {name: data.attrs[RECORD] for name, data in inputs.items()}
+        record = provenance(
+            plan, settings, source.fingerprint if source else None, records
+        ) | {"run": context.run.run_id, "checks": [check.name for check in plan.checks]}
+        shown = plan.pictures(dataset) if plan.pictures else {}
+        thumbnails = {name: thumbnail(picture) for name, picture in shown.items()}
+        return dg.Output(
+            dataset.assign_attrs({RECORD: record}), metadata={**metadata, **thumbnails}
+        )
+
+
+def provenance(
+    plan: AssetPlan,
+    settings: Settings,
+    source: str | None,
+    inputs: Mapping[str, Mapping[str, Any]],
+) -> dict[str, Any]:
+    """The part of a version's record that says what it was made of.
+
+    ``recipe`` is the hash of code, settings, source and the inputs' content: the launcher skips
+    what has it already. ``lineage`` leaves out code and content: versions of equal lineage were
+    asked for in the same way, so their figures may be compared.
+    """
+    chosen = settings.model_dump(mode="json")
+    contents = {name: record["content"] for name, record in inputs.items()}
+    lineages = {name: record["lineage"] for name, record in inputs.items()}
+    return {
+        "asset": f"{plan.schema.system}/{plan.name}",
+        "schema": plan.schema.number,
+        "settings": chosen,
+        "source": source,
+        "code": plan.code,
+        "inputs": [
+            {
+                "asset": name,
+                "partition": record["partition"],
+                "version": record["version"],
+                "content": record["content"],
+            }
+            for name, record in inputs.items()
+        ],
+        "recipe": _hash(plan.schema.number, plan.code, chosen, source, contents),
+        "lineage": _hash(chosen, source, lineages),
+    }
+
+
+def _hash(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def partition_folder(keys: Mapping[str, str]) -> str:
+    """Folder name of a partition: keys in the order of their dimensions' names."""
+    return ".".join(keys[name] for name in sorted(keys)) or WHOLE
+
+
+def partition_key(keys: Mapping[str, str]) -> str:
+    """Dagster's partition key: keys in the order of their dimensions' names."""
+    return "|".join(keys[name] for name in sorted(keys))
+
+
+def partition_keys(context: Any, by: Sequence[str]) -> dict[str, str]:
+    """The keys of a run's partition by dimension."""
+    return dict(zip(sorted(by), context.partition_key.split("|"), strict=True))
+

@@ -1,0 +1,152 @@
+"""How deep in the fur a pixel lies, told from its brightness.
+
+The fur is a uniform medium of thickness hb; light that enters from above decays with the depth h
+as I(h) = Imax exp(-a h) (Eq. 1). The photograph's histogram gives Imax and Imin, the luminances at
+the surface and at the skin. Depths here are fractions of hb, so a is per thickness.
+
+Luminance is linear. The layers hardly depend on that: Eq. 4 is a geometric series, so any power of
+the luminance (a display's gamma, say) cuts the photograph into the same layers.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.colour import decode_srgb
+
+Tails = Literal["end layers", "dropped"]
+
+MOST_LAYERS = 250
+"""A layer needs one step of the 8-bit depth code, and one code means *dropped*."""
+
+DROPPED = 255
+"""Depth code of a pixel that no layer shows."""
+
+
+class Attenuation(NamedTuple):
+    """The medium: luminance at the surface and at the skin, and the decay between them."""
+
+    brightest: float
+    """Imax, 1 = white."""
+    darkest: float
+    """Imin > 0."""
+
+    @property
+    def coefficient(self) -> float:
+        """a, per thickness (Eq. 2 with hb = 1)."""
+        return float(-np.log(self.darkest / self.brightest))
+
+    def luminance_at(self, depth: NDArray[np.floating]) -> NDArray[np.floating]:
+        """I(h) for depths as fractions of the thickness (Eq. 1)."""
+        return self.brightest * np.exp(-self.coefficient * depth)
+
+    def boundaries(self, layers: int) -> NDArray[np.float64]:
+        """I(n), n = 0 … layers: luminances between the layers (Eq. 4). Raises ValueError."""
+        require_layers(layers)
+        steps = np.arange(layers + 1) / layers
+        return np.asarray(self.brightest * (self.darkest / self.brightest) ** steps)
+
+
+class Histogram(NamedTuple):
+    """Pixels per bin of luminance; bin k lies between edges k and k + 1."""
+
+    counts: NDArray[np.int64]
+    edges: NDArray[np.float64]
+
+
+def luminance_histogram(luminance: NDArray[np.floating]) -> Histogram:
+    """256 bins, one about each sRGB code value, so an 8-bit grey photograph fills them exactly."""
+    codes = (np.arange(257) - 0.5) / 255.0
+    edges = np.concatenate([[0.0], decode_srgb(codes[1:-1]), [np.inf]])
+    places = np.searchsorted(edges, luminance.ravel(), side="right") - 1
+    return Histogram(np.bincount(places, minlength=256)[:256].astype(np.int64), edges)
+
+
+def fit_attenuation(luminance: NDArray[np.floating], *, tail: float) -> Attenuation:
+    """Imax and Imin from the histogram, with a share of ``tail`` pixels cut off at each end.
+
+    The thin tails of the histogram are noise (section 3.2): whole bins are cut while the pixels
+    cut stay within the share. Pure black is no light at all and always counts as tail, since
+    Imin must not be 0. Raises ValueError where no two luminances are left.
+    """
+    if not 0.0 <= tail < 0.5:
+        raise ValueError(f"tail is {tail}; expected a share in [0, 0.5).")
+    histogram = luminance_histogram(luminance)
+    places = np.searchsorted(histogram.edges, luminance, side="right") - 1
+    allowed = tail * luminance.size
+    below = np.cumsum(histogram.counts)
+    above = np.cumsum(histogram.counts[::-1])[::-1]
+    first = int(np.argmax(below > allowed))
+    last = 255 - int(np.argmax(above[::-1] > allowed))
+    kept = luminance[(places >= first) & (places <= last) & (luminance > 0)]
+    if kept.size == 0 or kept.min() == kept.max():
+        raise ValueError(
+            f"the photograph has a single luminance inside its tails of {tail:g}; "
+            "expected lighter and darker pixels."
+        )
+    return Attenuation(float(kept.max()), float(kept.min()))
+
+
+def layer_of(
+    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+) -> NDArray[np.uint8]:
+    """The layer of every pixel: n where I(n) < I <= I(n-1), 1 at the tips (section 3.2).
+
+    Imin itself belongs to the last layer. Pixels outside [Imin, Imax] go to the end layers or
+    are dropped (0). Raises ValueError.
+    """
+    descending = attenuation.boundaries(layers)
+    inner = descending[1:-1][::-1]
+    layer = layers - np.searchsorted(inner, luminance, side="left")
+    if tails == "dropped":
+        outside = (luminance > attenuation.brightest) | (luminance < attenuation.darkest)
+        layer = np.where(outside, 0, layer)
+    return layer.astype(np.uint8)
+
+
+def layer_masks(layer: NDArray[np.uint8], layers: int) -> NDArray[np.bool_]:
+    """One mask a layer, (layers, height, width); a dropped pixel is in none."""
+    return layer[None] == np.arange(1, layers + 1, dtype=np.uint8)[:, None, None]
+
+
+def code_steps(layers: int) -> int:
+    """Steps of the 8-bit depth code in each layer. Raises ValueError."""
+    require_layers(layers)
+    return DROPPED // layers
+
+
+def depth_code(
+    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+) -> NDArray[np.uint8]:
+    """Depth in 8 bits for the shader: layer n has the codes (n-1) s … n s - 1, s = code_steps.
+
+    The steps divide the layers evenly, so comparing codes is exactly the comparison of the full
+    luminance with I(n-1) and I(n), and the code still grows evenly with the depth, so filtering it
+    makes sense.
+    """
+    steps = code_steps(layers)
+    layer = layer_of(luminance, attenuation, layers, tails=tails)
+    with np.errstate(divide="ignore"):
+        depth = np.log(attenuation.brightest / luminance) / attenuation.coefficient
+    within = np.clip(depth * layers - (layer - 1.0), 0.0, 1.0)
+    step = np.minimum((within * steps).astype(np.int64), steps - 1)
+    code = (layer.astype(np.int64) - 1) * steps + step
+    return np.where(layer == 0, DROPPED, code).astype(np.uint8)
+
+
+def depth_rank_correlation(
+    luminance: NDArray[np.floating], depth: NDArray[np.floating]
+) -> float:
+    """Spearman rank correlation of darkness with true depth: 1 = brightness orders depth."""
+    from scipy.stats import spearmanr
+
+    return float(spearmanr(-luminance.ravel(), depth.ravel()).statistic)
+
+
+def require_layers(layers: int) -> None:
+    """Raise ValueError unless the number of layers can be drawn."""
+    if not 1 <= layers <= MOST_LAYERS:
+        raise ValueError(f"layers is {layers}; expected 1 to {MOST_LAYERS}.")

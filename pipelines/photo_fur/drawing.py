@@ -1,0 +1,103 @@
+"""The fur on the stage: one mesh with all its shells, one texture, one draw call.
+
+The photograph is uploaded once. Its alpha channel holds the depth code; a fragment of layer n is
+shown or not by the layer's two numbers, which the shader computes from n (section 3.3). Nothing
+is sent per layer or per frame.
+
+A layer filled as the paper has it shows the *bands* of pixels between I(n-1) and I(n): from the
+side these are thin slices that float one above the other. Filled in *columns*, the default, a
+pixel also stands in every layer below its own, as a hair does, as dark as the medium makes it
+down there: its colour times I(n) / I(own layer). From straight above both show the photograph.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.colour import to_8bit
+from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
+from pipelines.stage import Shader, Wrap, surface, texture
+
+Fill = Literal["columns", "bands"]
+
+_VERTEX = Shader(
+    vertex={
+        "TCoord::Dec": "in vec2 uv; in float layer; out vec2 uvOut; flat out float layerOut;",
+        "TCoord::Impl": "uvOut = uv; layerOut = layer;",
+    }
+)
+
+
+def fur_texture(
+    radiance: NDArray[np.floating],
+    luminance: NDArray[np.floating],
+    attenuation: Attenuation,
+    layers: int,
+    *,
+    tails: Tails,
+) -> NDArray[np.uint8]:
+    """The photograph as it is uploaded, (y, x, 4): 8-bit sRGB and the depth code in alpha."""
+    code = depth_code(luminance, attenuation, layers, tails=tails)
+    return np.dstack([to_8bit(radiance), code])
+
+
+def fur_surface(
+    shells: NDArray[np.float32],
+    normals: NDArray[np.floating],
+    triangles: NDArray[np.integer],
+    uvs: NDArray[np.floating],
+    image: NDArray[np.uint8],
+    attenuation: Attenuation,
+    *,
+    fill: Fill,
+    wrap: Wrap,
+    interpolate: bool,
+    lit: bool,
+) -> Any:
+    """All shells as one actor.
+
+    shells (N, V, 3), tips first; normals (V, 3); triangles (F, 3); uvs (V, 2); image from
+    ``fur_texture`` for the same N. Lambert shading where ``lit`` (section 3, results).
+    """
+    layers, count, _ = shells.shape
+    numbers = np.repeat(np.arange(1, layers + 1), count)
+    offsets = count * np.arange(layers)[:, None, None]
+    return surface(
+        shells.reshape(-1, 3),
+        (triangles[None] + offsets).reshape(-1, 3),
+        normals=np.tile(normals, (layers, 1)),
+        attributes={"uv": np.tile(uvs, (layers, 1)), "layer": numbers},
+        textures={
+            "photograph": texture(
+                image, wrap=wrap, interpolate=interpolate, mipmap=False, srgb=True
+            )
+        },
+        shader=Shader(_VERTEX.vertex, _fragment(layers, attenuation, fill)),
+        lit=lit,
+    )
+
+
+def _fragment(layers: int, attenuation: Attenuation, fill: Fill) -> dict[str, str]:
+    steps = code_steps(layers)
+    above = {
+        "bands": "discard;",
+        "columns": f"""{{
+    float own = floor(code / {steps}.0) + 1.0;
+    texel.rgb *= exp({attenuation.coefficient / layers!r} * (own - layerOut));
+  }}""",
+    }[fill]
+    return {
+        "TCoord::Dec": "in vec2 uvOut; flat in float layerOut;",
+        "Color::Impl": f"""//VTK::Color::Impl
+  vec4 texel = texture(photograph, uvOut);
+  float code = floor(texel.a * 255.0 + 0.5);
+  float deepest = layerOut * {steps}.0;
+  if (code >= deepest) discard;
+  if (code < deepest - {steps}.0) {above}
+  ambientColor = vec3(0.0);
+  diffuseColor = texel.rgb;
+""",
+    }

@@ -1,0 +1,119 @@
+"""Pictures of the fur: which views, and how they are taken (figures 3 to 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.colour import to_8bit
+from pipelines.photo_fur.attenuation import Attenuation, Tails
+from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.stage import Camera, Light, Stage, orbit
+
+BACKGROUND = (0.32, 0.34, 0.37)
+_VIEW_ANGLE = 30.0
+_MARGIN = 1.06
+
+
+class View(NamedTuple):
+    """One picture to take. Angles in degrees, as ``stage.orbit`` has them."""
+
+    azimuth: float
+    elevation: float
+    photograph: bool = False
+    """Straight above, orthographic, unlit, a texel a pixel: shows the photograph itself."""
+
+
+SQUARE_VIEWS = (View(-90.0, 90.0, photograph=True), View(-60.0, 28.0))
+"""Above and from the side (figure 3)."""
+
+ROUND_VIEWS = tuple(View(azimuth, 22.0) for azimuth in (-90.0, 0.0, 90.0, 180.0))
+"""Four sides, 90 degrees apart (figure 5)."""
+
+
+class Frames(NamedTuple):
+    """The pictures of one mesh, one a view."""
+
+    pictures: NDArray[np.uint8]
+    """(view, y, x, 3) 8-bit sRGB."""
+    coverage: NDArray[np.float64]
+    """(view,) share of the pixels with fur."""
+
+
+def draw_frames(
+    radiance: NDArray[np.floating],
+    luminance: NDArray[np.floating],
+    attenuation: Attenuation,
+    shells: NDArray[np.float32],
+    normals: NDArray[np.floating],
+    triangles: NDArray[np.integer],
+    uvs: NDArray[np.floating],
+    views: Sequence[View],
+    *,
+    size: tuple[int, int],
+    supersampling: int,
+    tails: Tails,
+    fill: Fill,
+    progress: Callable[[float], None],
+) -> Frames:
+    """Draw the fur from every view, in pictures of size = (height, width) pixels.
+
+    The light comes along the view, as it did in the photograph (Lambert).
+    """
+    image = fur_texture(radiance, luminance, attenuation, len(shells), tails=tails)
+    # The skin frames the picture: the layers stand out by their thickness, within the margin.
+    corners = shells.reshape(-1, 3)
+    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    radius = float(np.linalg.norm(corners - centre, axis=1).max())
+    pictures, coverage = [], []
+    for done, view in enumerate(views):
+        progress(done / len(views))
+        scale = 1 if view.photograph else supersampling
+        height, width = size
+        with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
+            stage.add(
+                fur_surface(
+                    shells,
+                    normals,
+                    triangles,
+                    uvs,
+                    image,
+                    attenuation,
+                    fill=fill,
+                    wrap="mirrored",
+                    interpolate=not view.photograph,
+                    lit=not view.photograph,
+                )
+            )
+            stage.light(Light())
+            stage.look(_camera(view, centre, radius, corners))
+            picture = stage.radiance()
+        pictures.append(to_8bit(picture[..., :3]))
+        coverage.append(float(np.mean(picture[..., 3] > 0)))
+    return Frames(np.stack(pictures), np.array(coverage))
+
+
+def top_view_error(picture: NDArray[np.uint8], radiance: NDArray[np.floating]) -> float:
+    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB."""
+    step = picture.astype(np.float64) - to_8bit(radiance)
+    return float(np.sqrt(np.mean((step / 255.0) ** 2)))
+
+
+def square_of_photograph(vertices: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.float32]:
+    """The unit square's vertices stretched in x to the photograph's proportions (y, x)."""
+    height, width = shape
+    return (vertices * np.array([width / height, 1.0, 1.0])).astype(np.float32)
+
+
+def _camera(
+    view: View, centre: NDArray[Any], radius: float, corners: NDArray[np.float32]
+) -> Camera:
+    target = (float(centre[0]), float(centre[1]), float(centre[2]))
+    if view.photograph:
+        height = float(np.ptp(corners[:, 1]))
+        return orbit(target, 4 * radius, view.azimuth, view.elevation, height=height)
+    distance = _MARGIN * radius / np.sin(np.radians(_VIEW_ANGLE / 2))
+    return orbit(target, distance, view.azimuth, view.elevation, view_angle=_VIEW_ANGLE)

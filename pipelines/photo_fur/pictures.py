@@ -1,0 +1,59 @@
+"""Pictures of what the model found: the histogram with its decay, and the layers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.photo_fur.attenuation import Attenuation
+
+
+def decay_picture(
+    counts: NDArray[np.int64],
+    edges: NDArray[np.float64],
+    attenuation: Attenuation,
+    boundaries: NDArray[np.float64],
+) -> NDArray[np.uint8]:
+    """The histogram with Imax and Imin, and I(h) with the layers' boundaries, side by side."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 3.4), dpi=110, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    shown = np.minimum(edges, 1.0)
+    left.stairs(counts, shown, fill=True, color="0.6")
+    for value, name in ((attenuation.darkest, "Imin"), (attenuation.brightest, "Imax")):
+        left.axvline(value, color="tab:red")
+        left.annotate(
+            f" {name} = {value:.3g}", (value, 1.0), xycoords=("data", "axes fraction"),
+            va="top", color="tab:red", rotation=90, ha="right",
+        )
+    left.set(xlabel="luminance (linear)", ylabel="pixels", xlim=(0, 1.05 * attenuation.brightest))
+    depth = np.linspace(0, 1, 200)
+    right.plot(depth, attenuation.luminance_at(depth), color="tab:blue")
+    layers = len(boundaries) - 1
+    right.plot(np.arange(layers + 1) / layers, boundaries, "o", color="tab:red", markersize=4)
+    right.set(xlabel="depth / thickness", ylabel="luminance (linear)", xlim=(0, 1), ylim=(0, None))
+    right.set_title(f"I(h) = Imax exp(-{attenuation.coefficient:.3g} h), {layers} layers")
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def layer_picture(layer: NDArray[np.uint8], layers: int) -> NDArray[np.uint8]:
+    """The layer of every pixel in colour: yellow at the tips, violet at the skin, red dropped."""
+    from matplotlib import colormaps
+
+    depth = (layers - layer.astype(np.float64)) / max(layers - 1, 1)
+    coloured = (colormaps["viridis"](np.clip(depth, 0.0, 1.0))[..., :3] * 255).astype(np.uint8)
+    coloured[layer == 0] = (200, 0, 0)
+    return coloured
+
+
+def contact_sheet(pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Pictures (n, y, x, 3) side by side, in two rows where there are more than two."""
+    columns = len(pictures) if len(pictures) <= 2 else (len(pictures) + 1) // 2
+    blank = np.zeros_like(pictures[:1])
+    padded = np.concatenate([pictures, blank.repeat(-len(pictures) % columns, axis=0)])
+    rows = padded.reshape(-1, columns, *pictures.shape[1:])
+    return np.vstack([np.hstack(list(row)) for row in rows])

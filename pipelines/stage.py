@@ -1,0 +1,350 @@
+"""An offscreen stage to draw on: cameras, lights, environment, textures, GLSL, frames.
+
+Everything is in linear light: textures are decoded when they are sampled, the framebuffer holds
+float radiance, and only ``Stage.frame`` encodes it as 8-bit sRGB. Pictures are the same, bit for
+bit, each time they are drawn on one machine.
+
+VTK draws through EGL, with a graphics card or with Mesa's software renderer; there is no
+multisampling (five times the time in software): ``supersampling`` averages radiance instead.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipelines.colour import to_8bit
+
+Vector = tuple[float, float, float]
+Wrap = Literal["repeat", "mirrored", "clamp"]
+
+_VTK_FLOAT = 10
+_WRAP_CODE = {"clamp": 0, "repeat": 1, "mirrored": 2}
+
+
+class NoGraphicsError(RuntimeError):
+    """There is no OpenGL driver to draw with."""
+
+
+# ---- cameras and lights ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the picture is taken from; lengths in scene units, angles in degrees."""
+
+    position: Vector
+    target: Vector
+    up: Vector = (0.0, 0.0, 1.0)
+    view_angle: float = 30.0
+    """Vertical field of view of a perspective camera."""
+    height: float | None = None
+    """Height of the picture in scene units; given, the camera is orthographic."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A directional light of the given radiance colour."""
+
+    towards: Vector | None = None
+    """Direction from the scene to the light; None: along the view."""
+    colour: Vector = (1.0, 1.0, 1.0)
+
+
+def orbit(
+    target: Vector,
+    distance: float,
+    azimuth: float,
+    elevation: float,
+    *,
+    view_angle: float = 30.0,
+    height: float | None = None,
+) -> Camera:
+    """A camera on a sphere about the target, z up.
+
+    Azimuth 0 lies on +x and turns towards +y; elevation 90 looks straight down with +y upwards in
+    the picture. Angles in degrees.
+    """
+    around, above = math.radians(azimuth), math.radians(elevation)
+    outward = np.array(
+        [math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)]
+    )
+    x, y, z = np.asarray(target) + distance * outward
+    overhead = abs(elevation) > 89.9
+    return Camera(
+        position=(float(x), float(y), float(z)),
+        target=target,
+        up=(0.0, 1.0, 0.0) if overhead else (0.0, 0.0, 1.0),
+        view_angle=view_angle,
+        height=height,
+    )
+
+
+# ---- textures and surfaces -------------------------------------------------------------------
+
+
+def texture(
+    image: NDArray[Any],
+    *,
+    wrap: Wrap = "clamp",
+    interpolate: bool = True,
+    mipmap: bool = False,
+    srgb: bool = False,
+) -> Any:
+    """An array (height, width, channels) as a VTK texture; row 0 is the top of the picture.
+
+    uint8 stays 8 bit a channel; ``srgb`` says that its colours are sRGB codes, decoded when they
+    are sampled (alpha is not). float32 stays float32.
+    """
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLTexture
+
+    if image.dtype not in (np.uint8, np.float32) or image.ndim != 3:
+        raise ValueError(
+            f"texture is {image.dtype} {image.shape}; expected uint8 or float32 (y, x, channel)."
+        )
+    height, width, channels = image.shape
+    flipped = np.ascontiguousarray(image[::-1]).reshape(-1, channels)
+    data = vtkImageData()
+    data.SetDimensions(width, height, 1)
+    data.GetPointData().SetScalars(numpy_to_vtk(flipped, deep=True))
+    made = vtkOpenGLTexture()
+    made.SetInputData(data)
+    made.SetColorModeToDirectScalars()
+    made.SetInterpolate(interpolate)
+    made.SetMipmap(mipmap)
+    made.SetWrap(_WRAP_CODE[wrap])
+    made.SetUseSRGBColorSpace(srgb)
+    return made
+
+
+@dataclass(frozen=True)
+class Shader:
+    """GLSL put into VTK's shaders: code by the name of its tag, e.g. ``"Color::Impl"``.
+
+    The code stands where VTK's own for that tag stood; a ``//VTK::…`` line inside keeps VTK's.
+    """
+
+    vertex: Mapping[str, str] = field(default_factory=dict)
+    fragment: Mapping[str, str] = field(default_factory=dict)
+
+
+def surface(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    normals: ArrayLike | None = None,
+    attributes: Mapping[str, ArrayLike] | None = None,
+    textures: Mapping[str, Any] | None = None,
+    shader: Shader | None = None,
+    colour: Vector = (1.0, 1.0, 1.0),
+    lit: bool = True,
+) -> Any:
+    """A triangle mesh as a VTK actor in one draw call.
+
+    vertices (V, 3), triangles (F, 3), normals (V, 3). ``attributes`` are float arrays (V,) or
+    (V, k), k <= 4: the vertex shader has them under their names. ``textures`` become samplers
+    under theirs. ``lit`` surfaces are Lambertian with the linear ``colour`` as albedo.
+    """
+    import pyvista as pv
+    from vtkmodules.vtkCommonDataModel import vtkDataObject
+    from vtkmodules.vtkRenderingCore import vtkActor
+    from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLPolyDataMapper
+
+    corners = np.asarray(triangles)
+    mesh = pv.PolyData.from_regular_faces(np.asarray(vertices, dtype=np.float32), corners)
+    if normals is not None:
+        mesh.point_data.active_normals = np.asarray(normals, dtype=np.float32)
+    mapper = vtkOpenGLPolyDataMapper()
+    mapper.SetInputDataObject(mesh)
+    mapper.ScalarVisibilityOff()
+    mapper.SetVBOShiftScaleMethod(0)
+    for name, values in (attributes or {}).items():
+        mesh.point_data[name] = np.asarray(values, dtype=np.float32)
+        mapper.MapDataArrayToVertexAttribute(
+            name, name, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
+        )
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    looks = actor.GetProperty()
+    looks.SetColor(*colour)
+    looks.SetAmbient(0.0)
+    looks.SetDiffuse(1.0)
+    looks.SetSpecular(0.0)
+    looks.SetLighting(lit)
+    looks.SetInterpolationToPhong()
+    for name, image in (textures or {}).items():
+        looks.SetTexture(name, image)
+    if shader is not None:
+        replacements = actor.GetShaderProperty()
+        for tag, code in shader.vertex.items():
+            replacements.AddVertexShaderReplacement(f"//VTK::{tag}", True, code, False)
+        for tag, code in shader.fragment.items():
+            replacements.AddFragmentShaderReplacement(f"//VTK::{tag}", True, code, False)
+    return actor
+
+
+# ---- the stage -------------------------------------------------------------------------------
+
+
+class Stage:
+    """An offscreen picture of width x height pixels; use it as a context manager.
+
+    ``background`` is a linear colour, or an environment: linear radiance (height, width, 3) in
+    equirectangular layout, z up, the left edge at azimuth -180 degrees. Raises NoGraphicsError.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        *,
+        background: Vector | NDArray[np.float32] = (0.0, 0.0, 0.0),
+        supersampling: int = 1,
+    ) -> None:
+        require_graphics()
+        import pyvista as pv
+
+        self.width, self.height, self.supersampling = width, height, supersampling
+        size = (width * supersampling, height * supersampling)
+        self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+        self._window = self._plotter.render_window
+        self._window.SetMultiSamples(0)
+        self._renderer = self._plotter.renderer
+        self._window.Render()
+        for buffer in (self._window.GetRenderFramebuffer(), self._window.GetDisplayFramebuffer()):
+            buffer.PopulateFramebuffer(*size, True, 1, _VTK_FLOAT, True, 32, 0, False)
+        if isinstance(background, np.ndarray):
+            self._renderer.AddActor(_sky(background))
+        else:
+            self._renderer.SetBackground(*background)
+        self._renderer.SetBackgroundAlpha(0.0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._plotter.close()
+
+    def add(self, *actors: Any) -> None:
+        """Put actors on the stage."""
+        for actor in actors:
+            self._renderer.AddActor(actor)
+
+    def remove(self, *actors: Any) -> None:
+        """Take actors off the stage."""
+        for actor in actors:
+            self._renderer.RemoveActor(actor)
+
+    def light(self, *lights: Light) -> None:
+        """Light the stage by these lights and no others."""
+        from vtkmodules.vtkRenderingCore import vtkLight
+
+        self._renderer.RemoveAllLights()
+        for light in lights:
+            made = vtkLight()
+            made.SetColor(*light.colour)
+            made.PositionalOff()
+            if light.towards is None:
+                made.SetLightTypeToHeadlight()
+            else:
+                made.SetLightTypeToSceneLight()
+                made.SetFocalPoint(0.0, 0.0, 0.0)
+                made.SetPosition(*light.towards)
+            self._renderer.AddLight(made)
+
+    def look(self, camera: Camera) -> None:
+        """Take the next frames from this camera."""
+        view = self._renderer.GetActiveCamera()
+        view.SetPosition(*camera.position)
+        view.SetFocalPoint(*camera.target)
+        view.SetViewUp(*camera.up)
+        view.SetParallelProjection(camera.height is not None)
+        if camera.height is not None:
+            view.SetParallelScale(camera.height / 2)
+        view.SetViewAngle(camera.view_angle)
+        self._renderer.ResetCameraClippingRange()
+
+    def draw(self) -> None:
+        """Draw and wait until it is done, without reading the picture back."""
+        self._window.Render()
+        self._window.WaitForCompletion()
+
+    def radiance(self) -> NDArray[np.float32]:
+        """Draw; linear radiance and coverage, (height, width, 4), row 0 at the top."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkFloatArray
+
+        self.draw()
+        columns, rows = self.width * self.supersampling, self.height * self.supersampling
+        pixels = vtkFloatArray()
+        self._window.GetRGBAPixelData(0, 0, columns - 1, rows - 1, 0, pixels, 0)
+        picture = vtk_to_numpy(pixels).reshape(rows, columns, 4)[::-1]
+        n = self.supersampling
+        return picture.reshape(self.height, n, self.width, n, 4).mean(axis=(1, 3))
+
+    def frame(self) -> NDArray[np.uint8]:
+        """Draw; the picture as 8-bit sRGB, (height, width, 3), row 0 at the top."""
+        return to_8bit(self.radiance()[..., :3])
+
+    @property
+    def renderer_name(self) -> str:
+        """What draws: the OpenGL renderer's own name."""
+        capabilities = self._window.ReportCapabilities()
+        for line in capabilities.splitlines():
+            if line.startswith("OpenGL renderer string:"):
+                return str(line.partition(":")[2].strip())
+        return "unknown"
+
+
+def _sky(environment: NDArray[np.float32]) -> Any:
+    from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSkybox
+
+    sky = vtkOpenGLSkybox()
+    sky.SetTexture(texture(np.ascontiguousarray(environment, dtype=np.float32), wrap="repeat"))
+    sky.SetProjectionToSphere()
+    sky.SetFloorPlane(0.0, 0.0, 1.0, 0.0)
+    sky.SetFloorRight(1.0, 0.0, 0.0)
+    sky.GammaCorrectOff()
+    return sky
+
+
+@functools.cache
+def require_graphics() -> None:
+    """Make sure that VTK can draw without a screen. Raises NoGraphicsError."""
+    if not sys.platform.startswith("linux"):
+        return
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    from vtkmodules.vtkCommonCore import vtkObject
+    from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
+
+    warnings = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.SetGlobalWarningDisplay(0)
+    try:
+        window = vtkEGLRenderWindow()
+        window.SetOffScreenRendering(True)
+        window.Initialize()
+        works = window.SupportsOpenGL()
+        window.Finalize()
+    finally:
+        vtkObject.SetGlobalWarningDisplay(warnings)
+    if not works:
+        raise NoGraphicsError(
+            "OpenGL cannot be started: EGL found no driver; expected a graphics card's driver or "
+            "Mesa (Debian, Ubuntu: sudo apt-get install libegl1 libgl1-mesa-dri)."
+        )

@@ -1,0 +1,38 @@
+#!/bin/sh
+# The virtual environment and the files that name this checkout's folders.
+set -eu
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+
+python=${PYTHON:-python3}
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
+    echo "Python is $("$python" --version 2>&1); expected 3.11 or newer (set PYTHON=…)." >&2
+    exit 1
+}
+if [ ! -x .venv/bin/python ]; then
+    "$python" -m venv .venv || {
+        rm -rf .venv
+        echo "python3 -m venv failed; on Debian and Ubuntu: sudo apt-get install -y python3-venv" >&2
+        exit 1
+    }
+fi
+.venv/bin/python -m pip install --quiet --disable-pip-version-check \
+    --constraint constraints.txt --editable '.[dev]'
+
+mkdir -p .dagster data
+cat > .env <<ENV
+DAGSTER_HOME=$root/.dagster
+TSUYA_DATA=$root/data
+ENV
+cat > .dagster/dagster.yaml <<'YAML'
+# One run at a time: a run uses all cores of a small machine by itself.
+concurrency:
+  runs:
+    max_concurrent_runs: 1
+  pools:
+    default_limit: 1
+run_monitoring:
+  enabled: true
+telemetry:
+  enabled: false
+YAML

@@ -1,0 +1,1 @@
+"""Everything on disk: the versioned Zarr store, its IO manager, schemas and users' files."""

@@ -1,0 +1,199 @@
+"""Triangle meshes: PLY, OBJ and GLB."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from storage.readers.bad_input import BadInput
+from storage.readers.obj_files import read_obj
+from storage.readers.ply_files import read_ply
+from storage.readers.polygons import PolygonMesh, triangulate
+
+if TYPE_CHECKING:
+    import trimesh
+
+FORMATS = "a PLY, OBJ or GLB mesh"
+
+_PACKED_GEOMETRY = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}
+
+
+class MeshFile(NamedTuple):
+    """``vertices`` (V, 3) float64; ``triangles`` (F, 3) int64; ``uvs`` (V, 2) float64 with (0, 0)
+    at the bottom left of the photograph, or None. Every vertex belongs to a triangle; vertices
+    are split where one position has several texture coordinates."""
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    uvs: NDArray[np.float64] | None
+
+
+def read_mesh(path: str | PathLike[str]) -> MeshFile:
+    """Read a PLY (ASCII or binary), OBJ or GLB file as one triangle mesh.
+
+    Polygons are cut into triangles, several objects become one, transforms of a GLB's nodes are
+    applied, vertices without a face are left out. Texture coordinates that only some corners
+    have count as none. Axes and units stay those of the file.
+
+    Raises BadInput for a file that is missing, truncated or of another format, and for meshes
+    without faces, with positions or texture coordinates that are not finite, with references to
+    vertices that do not exist, or with degenerate faces (repeated corners, no area).
+    """
+    file = Path(path)
+    mesh = _read_polygons(file)
+    _check_polygons(file, mesh)
+    triangles, owners = triangulate(mesh.positions, mesh.sizes, mesh.corners)
+    _check_areas(file, mesh.positions[mesh.corners[triangles]], owners)
+    return _split_by_uv(mesh, triangles)
+
+
+def _read_polygons(file: Path) -> PolygonMesh:
+    if file.is_dir():
+        raise BadInput(file, "file", "a directory", FORMATS)
+    try:
+        with file.open("rb") as stream:
+            start = stream.read(4)
+    except FileNotFoundError:
+        raise BadInput(file, "file", "missing", FORMATS) from None
+    except OSError as error:
+        raise BadInput(file, "file", f"unreadable ({error.strerror})", FORMATS) from error
+    if start == b"glTF":
+        return _read_glb(file)
+    if start[:3] == b"ply" and start[3:].isspace():
+        return read_ply(file)
+    if file.suffix.lower() == ".obj":  # plain text, without a mark of its own
+        return read_obj(file)
+    raise BadInput(file, "format", "unknown" if start else "unknown (the file is empty)", FORMATS)
+
+
+# --- Checks -------------------------------------------------------------------------------------
+
+
+def _check_polygons(file: Path, mesh: PolygonMesh) -> None:
+    if len(mesh.sizes) == 0:
+        points = f"{len(mesh.positions)} points without faces"
+        raise BadInput(file, "content", points, "at least one face")
+    if mesh.sizes.min() < 3:
+        face = int(np.argmax(mesh.sizes < 3))
+        raise BadInput(
+            file, f"face {face}", f"of {mesh.sizes[face]} corners", "at least three corners"
+        )
+    count = len(mesh.positions)
+    wrong = (mesh.corners < 0) | (mesh.corners >= count)
+    if wrong.any():
+        corner = int(np.argmax(wrong))
+        face = int(np.searchsorted(np.cumsum(mesh.sizes), corner, side="right"))
+        found = f"a reference to vertex {mesh.corners[corner]}"
+        raise BadInput(file, f"face {face}", found, f"vertices 0 to {count - 1}")
+    used = np.zeros(count, bool)
+    used[mesh.corners] = True
+    _check_finite(file, "vertex", mesh.positions, used)
+    if mesh.corner_uvs is not None:
+        everywhere = np.ones(len(mesh.corner_uvs), bool)
+        _check_finite(file, "texture coordinate of corner", mesh.corner_uvs, everywhere)
+
+
+def _check_finite(
+    file: Path, field: str, values: NDArray[np.float64], used: NDArray[np.bool_]
+) -> None:
+    wrong = used & ~np.isfinite(values).all(axis=1)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        found = "(" + ", ".join(f"{value:g}" for value in values[first]) + ")"
+        raise BadInput(file, f"{field} {first}", found, "finite numbers")
+
+
+def _check_areas(file: Path, triangles: NDArray[np.float64], owners: NDArray[np.int64]) -> None:
+    """Triangles (F, 3, 3) of the polygons ``owners``. Twice the area is compared with the
+    squared longest side: below 1e-12 three corners are on a line as far as doubles can tell."""
+    sides = triangles - np.roll(triangles, 1, axis=1)
+    longest = (sides**2).sum(axis=2).max(axis=1)
+    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    faces = np.unique(owners[doubled <= 1e-12 * longest])
+    if len(faces):
+        others = f", and so are {len(faces) - 1} more faces" if len(faces) > 1 else ""
+        found = f"degenerate (repeated corners or no area){others}"
+        raise BadInput(file, f"face {faces[0]}", found, "three distinct corners not on a line")
+
+
+def _split_by_uv(mesh: PolygonMesh, triangles: NDArray[np.int64]) -> MeshFile:
+    if mesh.corner_uvs is None:
+        used, corners = np.unique(mesh.corners, return_inverse=True)
+        return MeshFile(mesh.positions[used], corners.reshape(-1)[triangles], None)
+    keys = np.column_stack([mesh.corners.astype(np.float64), mesh.corner_uvs])
+    unique, corners = np.unique(keys, axis=0, return_inverse=True)
+    vertices = mesh.positions[unique[:, 0].astype(np.int64)]
+    return MeshFile(vertices, corners.reshape(-1)[triangles], unique[:, 1:].copy())
+
+
+# --- GLB ----------------------------------------------------------------------------------------
+
+
+def _read_glb(file: Path) -> PolygonMesh:
+    """Through trimesh, which turns the texture coordinates' origin from the top left (glTF 2.0)
+    to the bottom left."""
+    import trimesh
+
+    data = file.read_bytes()
+    _check_glb_header(file, data)
+    try:
+        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
+        placed = [(scene.geometry[name], matrix) for name, matrix in _placements(scene)]
+    except Exception as error:  # by what is broken: KeyError, ValueError, IndexError, ...
+        raise BadInput(file, "content", "damaged", "a complete GLB file") from error
+    positions, corners, uvs, count = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [], 0
+    for geometry, matrix in placed:
+        if not isinstance(geometry, trimesh.Trimesh):
+            continue  # points and lines
+        triangles = np.asarray(geometry.faces, np.int64)
+        if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns the triangles inside out
+            triangles = triangles[:, ::-1]
+        vertices = np.asarray(geometry.vertices, np.float64)
+        positions.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        corners.append(triangles.ravel() + count)
+        count += len(vertices)
+        uvs.append(_glb_uvs(geometry, triangles))
+    complete = [uv for uv in uvs if uv is not None]
+    joined = np.concatenate(corners)
+    return PolygonMesh(
+        np.concatenate(positions),
+        np.full(len(joined) // 3, 3, np.int64),
+        joined,
+        np.concatenate(complete) if complete and len(complete) == len(uvs) else None,
+    )
+
+
+def _placements(scene: trimesh.Scene) -> list[tuple[Any, NDArray[np.float64]]]:
+    """Which geometry stands where: one entry for each node that shows one."""
+    nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    return [(name, np.asarray(matrix, np.float64)) for matrix, name in nodes]
+
+
+def _glb_uvs(geometry: trimesh.Trimesh, triangles: NDArray[np.int64]) -> NDArray[np.float64] | None:
+    uv = getattr(geometry.visual, "uv", None)
+    if uv is None or len(uv) != len(geometry.vertices):
+        return None
+    return np.asarray(uv, np.float64)[triangles.ravel()]
+
+
+def _check_glb_header(file: Path, data: bytes) -> None:
+    """glTF 2.0, 4.4: 12 bytes of header, then a chunk of JSON."""
+    try:
+        version, length, json_length = struct.unpack_from("<4xIII", data)
+        if len(data) < length:
+            raise ValueError
+        description = json.loads(data[20 : 20 + json_length])
+        required = set(description.get("extensionsRequired", ()))
+    except (struct.error, ValueError, AttributeError, TypeError):
+        raise BadInput(file, "content", "truncated or damaged", "a complete GLB file") from None
+    if version != 2:
+        raise BadInput(file, "glTF version", str(version), "2")
+    if packed := sorted(required & _PACKED_GEOMETRY):
+        raise BadInput(file, "geometry", f"packed by {packed[0]}", "plain glTF 2.0 geometry")

@@ -1,0 +1,231 @@
+"""The command line: ``tsuya run``, ``demo``, ``status``, ``path``, ``rollback``, ``doctor``.
+
+Exit codes: 0 done, 1 a run or a check failed, 2 what was given cannot be used.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from assets_defs.definitions import SYSTEMS
+from assets_defs.inbox import take_in
+from assets_defs.launcher import LaunchError, Outcome, Request
+from assets_defs.settings import PRESETS
+from assets_defs.system import System
+from assets_defs.workspace import CHECKOUT, Workspace
+from storage.errors import StoreError
+from tsuya.doctor import examine
+from tsuya.gallery import write_gallery
+from tsuya.report import figures_table, outcome_reports, parse_key, slot_report, status_table
+from tsuya.session import Session, SetUpError, open_session
+
+PICTURES = CHECKOUT / "pictures"
+
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+def _says_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """What went wrong as one sentence on stderr, and the exit code that belongs to it."""
+
+    @functools.wraps(command)
+    def wrapped(*arguments: Any, **options: Any) -> None:
+        try:
+            command(*arguments, **options)
+        except LaunchError as error:
+            _fail(str(error), 1)
+        except (ValueError, StoreError, SetUpError) as error:
+            _fail(str(error), 2)
+
+    return wrapped
+
+
+def _fail(sentence: str, code: int) -> None:
+    click.echo(sentence, err=True)
+    sys.exit(code)
+
+
+@click.group()
+@click.version_option(package_name="tsuya")
+def main() -> None:
+    """Appearance measurements to compact assets and pictures."""
+
+
+@main.group()
+def run() -> None:
+    """Make a system's assets; what is current is skipped."""
+
+
+def _run_command(system: System) -> click.Command:
+    """``tsuya run SYSTEM``: one option a dimension, from what the system declares."""
+
+    @_says_errors
+    def launch(
+        preset: str | None, settings: Sequence[str], force: bool, as_json: bool, **items: Any
+    ) -> None:
+        console = Console(stderr=True)
+        with open_session(console) as session:
+            started = time.perf_counter()
+            chosen = {
+                dimension.name: [
+                    _key(item, system, dimension.name, session)
+                    for item in items[dimension.name] or dimension.builtin
+                ]
+                for dimension in system.dimensions
+            }
+            request = Request(system, system.span(chosen), preset, _fields(settings), force)
+            outcomes = session.launcher.launch(request)
+            seconds = time.perf_counter() - started
+        _report(session, outcomes, seconds, as_json)
+
+    options: list[click.Parameter] = [
+        click.Option(
+            [f"--{dimension.name}"],
+            multiple=True,
+            help=f"A file ({', '.join(dimension.suffixes)}) or one of "
+            f"{', '.join(dimension.builtin)}; may be repeated. Default: all built-in ones.",
+        )
+        for dimension in system.dimensions
+    ]
+    options += [
+        click.Option(["--preset"], type=click.Choice(PRESETS), help="Sizes; default: as before."),
+        click.Option(
+            ["--set", "settings"],
+            multiple=True,
+            metavar="FIELD=VALUE",
+            help="A setting, for every asset that has it; may be repeated.",
+        ),
+        click.Option(["--force"], is_flag=True, help="Also make what is current."),
+        click.Option(["--json", "as_json"], is_flag=True, help="Print one JSON object."),
+    ]
+    names = sorted({f for plan in system.plans.values() for f in plan.settings.model_fields})
+    return click.Command(
+        system.name,
+        callback=launch,
+        params=options,
+        help=f"{system.title}. Settings: {', '.join(names)}.",
+    )
+
+
+for _system in SYSTEMS.values():
+    run.add_command(_run_command(_system))
+
+
+@main.command()
+@_as_json
+@_says_errors
+def demo(as_json: bool) -> None:
+    """Make every system's built-in examples and write their pictures."""
+    console = Console(stderr=True)
+    started = time.perf_counter()
+    outcomes: list[Outcome] = []
+    with open_session(console) as session:
+        for system in SYSTEMS.values():
+            everything = {
+                dimension.name: list(dimension.builtin) for dimension in system.dimensions
+            }
+            request = Request(system, system.span(everything), preset="demo")
+            outcomes += session.launcher.launch(request)
+    seconds = time.perf_counter() - started
+    written = write_gallery(session.workspace.store, [each.slot for each in outcomes], PICTURES)
+    _report(session, outcomes, seconds, as_json)
+    if not as_json:
+        for path in written:
+            click.echo(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+        click.echo("\nLook at the pictures above. `make ui` opens the graph: http://127.0.0.1:3000")
+
+
+@main.command()
+@_as_json
+@_says_errors
+def status(as_json: bool) -> None:
+    """What is stored: versions, sizes, what waits for checks, what was rejected."""
+    store = _workspace().store
+    reports = [slot_report(store, slot) for slot in store.slots()]
+    if as_json:
+        click.echo(json.dumps({"assets": reports}))
+    else:
+        Console().print(status_table(reports))
+
+
+@main.command()
+@click.argument("key")
+@_says_errors
+def path(key: str) -> None:
+    """Print the folder of KEY's current version, e.g. photo_fur/fur_photo/grass."""
+    click.echo(_workspace().store.folder(parse_key(key)))
+
+
+@main.command()
+@click.argument("key")
+@_says_errors
+def rollback(key: str) -> None:
+    """Make the good version before KEY's current one current again."""
+    click.echo(_workspace().store.rollback(parse_key(key)))
+
+
+@main.command()
+@_as_json
+def doctor(as_json: bool) -> None:
+    """Check what the project needs of this machine, and draw one picture."""
+    _workspace()
+    findings = examine(PICTURES / "doctor.png")
+    if as_json:
+        click.echo(json.dumps({"findings": [vars(finding) for finding in findings]}))
+    for finding in findings if not as_json else ():
+        click.echo(f"{'ok  ' if finding.met else 'FAIL'} {finding.requirement}: {finding.found}")
+    sys.exit(0 if all(finding.met for finding in findings) else 1)
+
+
+def _workspace() -> Workspace:
+    from dotenv import load_dotenv
+
+    load_dotenv(CHECKOUT / ".env")
+    return Workspace.from_environment()
+
+
+def _key(item: str, system: System, dimension: str, session: Session) -> str:
+    """The key of a built-in or registered item; a file is taken into the inbox."""
+    inbox = session.workspace.inbox(system.name)
+    if item in system.sources(dimension, inbox):
+        return item
+    if not Path(item).exists():
+        known = ", ".join(system.sources(dimension, inbox))
+        raise ValueError(f"{item}: no such {dimension}; expected a file or one of {known}.")
+    return take_in(
+        Path(item), system, system.dimension(dimension), session.workspace, session.instance
+    )
+
+
+def _fields(settings: Sequence[str]) -> Mapping[str, Any]:
+    """``FIELD=VALUE`` pairs; values are JSON where they can be, else text."""
+    fields = {}
+    for pair in settings:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise ValueError(f"--set is {pair!r}; expected FIELD=VALUE.")
+        try:
+            fields[name] = json.loads(value)
+        except ValueError:
+            fields[name] = value
+    return fields
+
+
+def _report(
+    session: Session, outcomes: Sequence[Outcome], seconds: float, as_json: bool
+) -> None:
+    reports = outcome_reports(session.workspace.store, outcomes)
+    if as_json:
+        click.echo(json.dumps({"seconds": round(seconds, 3), "assets": reports}))
+        return
+    Console().print(figures_table(reports))
+    made = sum(1 for outcome in outcomes if outcome.state == "made")
+    click.echo(f"{made} made, {len(outcomes) - made} current already, {seconds:.1f} s.")

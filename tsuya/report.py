@@ -1,0 +1,104 @@
+"""What a launch and a store say to a person: tables, and the same as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from assets_defs.definitions import SYSTEMS
+from assets_defs.launcher import Outcome
+from storage.versions import Slot, VersionedStore
+from storage.zarr_files import stored_bytes
+
+
+def slot_report(store: VersionedStore, slot: Slot) -> dict[str, Any]:
+    """A slot's current version with its figures, and what waits or was rejected."""
+    pointer = store.pointer(slot)
+    versions = store.versions(slot)
+    report: dict[str, Any] = {
+        "key": str(slot),
+        "version": pointer.version,
+        "earlier": len(pointer.earlier),
+        "unchecked": len(pointer.candidates),
+        "rejected": [
+            version
+            for version in versions
+            if any(not verdict["passed"] for verdict in store.verdicts(slot, version).values())
+        ],
+    }
+    if pointer.version is not None:
+        record = store.record(slot)
+        report |= {
+            "created": record["created"],
+            "settings": record["settings"],
+            "bytes": stored_bytes(store.folder(slot)),
+            "figures": {
+                check: verdict["figure"]
+                for check, verdict in store.verdicts(slot, pointer.version).items()
+                if verdict["figure"] is not None
+            },
+        }
+    return report
+
+
+def outcome_reports(store: VersionedStore, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """Each outcome with the report of its slot."""
+    return [
+        {"state": outcome.state, "seconds": round(outcome.seconds, 3)}
+        | slot_report(store, outcome.slot)
+        for outcome in outcomes
+    ]
+
+
+def figures_table(reports: Sequence[dict[str, Any]]) -> Table:
+    """One row an asset's partition: what became of it, its size and its figures."""
+    table = Table(title="Figures", title_justify="left")
+    for name, justify in (("asset", "left"), ("", "left"), ("s", "right"), ("kB", "right")):
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("figures of the checks")
+    for report in reports:
+        figures = ", ".join(
+            f"{name} {value:.4g}" for name, value in report.get("figures", {}).items()
+        )
+        table.add_row(
+            report["key"].partition("/")[2],
+            report["state"],
+            f"{report['seconds']:.2f}",
+            f"{report.get('bytes', 0) / 1000:.0f}",
+            figures,
+        )
+    return table
+
+
+def status_table(reports: Sequence[dict[str, Any]]) -> Table:
+    """One row a slot of the store."""
+    table = Table(title="What is stored", title_justify="left")
+    for name in ("asset", "current version", "kB", "earlier", "unchecked", "rejected"):
+        table.add_column(name, justify="right" if name in ("kB", "earlier") else "left")
+    for report in reports:
+        table.add_row(
+            report["key"],
+            report["version"] or "none",
+            f"{report.get('bytes', 0) / 1000:.0f}",
+            str(report["earlier"]),
+            str(report["unchecked"] or ""),
+            str(len(report["rejected"]) or ""),
+        )
+    return table
+
+
+def parse_key(key: str) -> Slot:
+    """A slot from ``system/asset/partition``; keys of a partition are joined by ``.`` or ``|``.
+
+    Raises ValueError.
+    """
+    parts = key.strip("/").split("/")
+    if len(parts) != 3 or parts[0] not in SYSTEMS or parts[1] not in SYSTEMS[parts[0]].plans:
+        known = [f"{name}/{asset}" for name, system in SYSTEMS.items() for asset in system.plans]
+        raise ValueError(
+            f"key is {key!r}; expected system/asset/partition with one of {', '.join(known)}."
+        )
+    system, asset, partition = parts
+    return Slot(system, asset, partition.replace("|", "."))
