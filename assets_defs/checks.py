@@ -4,9 +4,8 @@ A check that fails, or that cannot be computed, rejects the version: the last go
 afterwards. One that passes counts towards the promotion of a new version.
 """
 
-from __future__ import annotations
-
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -33,11 +32,11 @@ class Checked:
         return self.store.record(self.slot, self.version)
 
     @property
-    def dataset(self) -> xr.Dataset:
+    def dataset(self) -> "xr.Dataset":
         """The version, lazy."""
         return self.store.open(self.slot, self.version)
 
-    def input(self, asset: str) -> xr.Dataset:
+    def input(self, asset: str) -> "xr.Dataset":
         """The version of an upstream asset that this one was made from, lazy."""
         for entry in self.record["inputs"]:
             if entry["asset"] == asset:
@@ -57,6 +56,19 @@ class Check:
     at_least: float | None = None
     change: float | None = None
     """Largest step for the worse since the last good version of equal settings."""
+
+    def bounds(self) -> str:
+        """The bounds in words."""
+        parts = [
+            f"{words} {value:g}"
+            for words, value in (
+                ("at most", self.at_most),
+                ("at least", self.at_least),
+                ("step for the worse at most", self.change),
+            )
+            if value is not None
+        ]
+        return ", ".join(parts)
 
     def problem(self, figure: float, before: float | None) -> str | None:
         """Why a figure does not pass, in one sentence; None where it does."""
@@ -100,7 +112,10 @@ def build_check(
     slot_of: Callable[[Any], Slot],
 ) -> dg.AssetChecksDefinition:
     """The blocking Dagster check. It is told its partitions: else it would load all of them."""
+    # Telling the partitions is a preview of Dagster's: its version is pinned.
+    warnings.filterwarnings("ignore", category=dg.PreviewWarning)
 
+    # Dagster looks at the annotations themselves: no postponed ones in this module.
     @dg.asset_check(
         asset=asset,
         name=check.name,

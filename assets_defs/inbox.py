@@ -4,8 +4,6 @@ What is already registered under its name and has not changed since is left alon
 line registers the files that it copies here and launches them itself.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

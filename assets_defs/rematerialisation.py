@@ -4,8 +4,6 @@ A tick cannot order grains, so it requests one run of the job `launch`, which ca
 the grain runs execute in that process, on the same instance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import dagster as dg

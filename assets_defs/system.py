@@ -109,7 +109,8 @@ class System:
     dimensions: tuple[Dimension, ...]
     plans: dict[str, AssetPlan] = field(default_factory=dict)
     """In the order of declaration: inputs come before what is made from them."""
-    definitions: list[dg.AssetsDefinition | dg.AssetChecksDefinition] = field(default_factory=list)
+    assets: list[dg.AssetsDefinition] = field(default_factory=list)
+    asset_checks: list[dg.AssetChecksDefinition] = field(default_factory=list)
 
     # ---- partitions and sources --------------------------------------------------------------
 
@@ -250,9 +251,9 @@ class System:
             )
             self.plans[plan.name] = plan
             asset = self._dagster_asset(plan, function, kinds)
-            self.definitions.append(asset)
+            self.assets.append(asset)
             for check in checks:
-                self.definitions.append(build_check(check, asset, self._slot_of(plan)))
+                self.asset_checks.append(build_check(check, asset, self._slot_of(plan)))
             return function
 
         return declare

@@ -160,14 +160,13 @@ class VersionedStore:
 
     # ---- writing -----------------------------------------------------------------------------
 
-    def write(
-        self, slot: Slot, dataset: xr.Dataset, record: Mapping[str, Any]
-    ) -> Written:
+    def write(self, slot: Slot, dataset: xr.Dataset, record: Mapping[str, Any]) -> Written:
         """Write a dataset as a new version, a candidate until its checks have passed.
 
         ``record`` must hold ``settings``, ``recipe`` and ``checks``, the names of the blocking
         checks; with none of them the version becomes current at once. Content that equals the
-        current version's under equal settings adds no version. Raises StoreFullError, StoreError; then nothing that was stored has changed.
+        current version's under equal settings adds no version. Raises StoreFullError, StoreError;
+        then nothing that was stored has changed.
         """
         version = f"{datetime.now(UTC):%Y%m%dT%H%M%S%f}-{uuid.uuid4().hex[:8]}"
         staged = self._folder(slot) / "staging" / version
@@ -183,7 +182,7 @@ class VersionedStore:
                 array_bytes=int(dataset.nbytes),
             )
             zarr_files.sync(staged)
-            written = self._publish(slot, staged, Written(version, content, True), dict(record))
+            written = self._publish(slot, staged, Written(version, content, True))
         except OSError as error:
             raise zarr_files.disk_error(error, staged) from error
         finally:
@@ -191,24 +190,34 @@ class VersionedStore:
         self.collect(slot)
         return written
 
-    def _publish(
-        self, slot: Slot, staged: Path, written: Written, record: dict[str, Any]
-    ) -> Written:
+    def _publish(self, slot: Slot, staged: Path, written: Written) -> Written:
+        record = zarr_files.read_record(staged)  # As JSON: a tuple among settings is a list now.
         with self._locked(slot) as pointer:
-            if pointer.version is not None:
-                now = self.record(slot, pointer.version)
-                same = ("content", written.content), ("settings", record["settings"])
-                if all(now[name] == value for name, value in same):
-                    self._point(slot, replace(pointer, recipe=record["recipe"]))
-                    return Written(pointer.version, written.content, False)
+            if pointer.version is not None and self._is_equal(slot, pointer.version, record):
+                self._point(slot, replace(pointer, recipe=record["recipe"]))
+                return Written(pointer.version, written.content, False)
             versions = self._folder(slot) / "versions"
             versions.mkdir(exist_ok=True)
             os.rename(staged, versions / written.version)
-            zarr_files.sync_folder(versions)
-            candidates = (*pointer.candidates, written.version)
-            self._point(slot, replace(pointer, candidates=candidates))
-            self._promote_if_passed(slot, written.version)
+            try:
+                zarr_files.sync_folder(versions)
+                waiting = replace(pointer, candidates=(*pointer.candidates, written.version))
+                self._point(slot, self._promoted(slot, waiting, written.version))
+            except (OSError, StoreError):
+                # A full disk: what the pointer does not name must not fill it further.
+                if self.pointer(slot) == pointer:
+                    shutil.rmtree(versions / written.version, ignore_errors=True)
+                raise
         return written
+
+    def _is_equal(self, slot: Slot, version: str, record: Mapping[str, Any]) -> bool:
+        """Whether a version is complete and has the same content under the same settings."""
+        try:
+            now = self.record(slot, version)
+            zarr_files.verify_complete(self.folder(slot, version))
+        except StoreError:
+            return False  # Damaged by hand: what is written now takes its place.
+        return all(now[name] == record[name] for name in ("content", "settings"))
 
     # ---- verdicts ----------------------------------------------------------------------------
 
@@ -219,9 +228,11 @@ class VersionedStore:
 
     def pass_version(self, slot: Slot, version: str, check: str, figure: float | None) -> None:
         """Note that a check passed; the last one that was waited for makes the version current."""
-        with self._locked(slot):
+        with self._locked(slot) as pointer:
             self._note(slot, version, check, passed=True, figure=figure)
-            self._promote_if_passed(slot, version)
+            promoted = self._promoted(slot, pointer, version)
+            if promoted != pointer:
+                self._point(slot, promoted)
 
     def reject(self, slot: Slot, version: str, check: str, reason: str) -> str | None:
         """Note that a check failed; the last good version is current again.
@@ -247,7 +258,9 @@ class VersionedStore:
         with self._locked(slot) as pointer:
             changed = self._step_back(slot, pointer)
             if changed.version is None:
-                raise NoVersionError(f"{slot}: no earlier good version; expected one to go back to.")
+                raise NoVersionError(
+                    f"{slot}: no earlier good version; expected one to go back to."
+                )
             self._point(slot, changed)
             return changed.version
 
@@ -258,23 +271,24 @@ class VersionedStore:
         recipe = self.record(slot, version)["recipe"]
         return replace(pointer, version=version, recipe=recipe, earlier=tuple(earlier))
 
-    def _promote_if_passed(self, slot: Slot, version: str) -> None:
-        """Needs the lock. A version older than the current one joins the earlier good ones."""
-        pointer = self.pointer(slot)
+    def _promoted(self, slot: Slot, pointer: Pointer, version: str) -> Pointer:
+        """The pointer once a candidate has passed all its checks; else the same pointer.
+
+        A version older than the current one joins the earlier good ones.
+        """
         if version not in pointer.candidates:
-            return
+            return pointer
         record = self.record(slot, version)
         verdicts = self.verdicts(slot, version)
         if not all(verdicts.get(check, {}).get("passed") for check in record["checks"]):
-            return
+            return pointer
         candidates = tuple(name for name in pointer.candidates if name != version)
         if pointer.version is not None and version < pointer.version:
             older = tuple(sorted((version, *pointer.earlier), reverse=True))[: self.keep - 1]
-            self._point(slot, replace(pointer, earlier=older, candidates=candidates))
-            return
+            return replace(pointer, earlier=older, candidates=candidates)
         before = () if pointer.version is None else (pointer.version,)
         earlier = (*before, *pointer.earlier)[: self.keep - 1]
-        self._point(slot, Pointer(version, record["recipe"], earlier, candidates))
+        return Pointer(version, record["recipe"], earlier, candidates)
 
     # ---- collection --------------------------------------------------------------------------
 
@@ -294,13 +308,16 @@ class VersionedStore:
                 for name in self.versions(slot)
                 if name not in kept and self._is_old(folder / "versions" / name / "zarr.json")
             ]
-            for name in old:
-                os.rename(folder / "versions" / name, folder / "staging" / f"collected-{name}")
+            # The pointer first: it must not name a folder that is gone.
             candidates = tuple(name for name in pointer.candidates if name not in old)
             if candidates != pointer.candidates:
                 self._point(slot, replace(pointer, candidates=candidates))
-        left = [path for path in (folder / "staging").iterdir() if self._is_old(path)]
-        for path in left:
+            moved = [folder / "staging" / f"collected-{name}" for name in old]
+            for name, path in zip(old, moved, strict=True):
+                os.rename(folder / "versions" / name, path)
+        staging = (folder / "staging").iterdir()
+        left = [path for path in staging if path not in moved and self._is_old(path)]
+        for path in (*moved, *left):
             shutil.rmtree(path, ignore_errors=True)
         return [*old, *(path.name for path in left)]
 
@@ -330,13 +347,13 @@ class VersionedStore:
 
     def _note(self, slot: Slot, version: str, check: str, **verdict: Any) -> None:
         path = self._folder(slot) / "verdicts" / f"{version}.json"
-        path.parent.mkdir(exist_ok=True)
         self._replace(path, {**self.verdicts(slot, version), check: verdict})
 
     def _replace(self, path: Path, fields: Mapping[str, Any]) -> None:
         """Write beside, fsync, rename over: a reader sees the old file or the new one."""
         beside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}")
         try:
+            path.parent.mkdir(exist_ok=True)
             with beside.open("w") as file:
                 json.dump(fields, file, indent=2)
                 file.flush()

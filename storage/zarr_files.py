@@ -150,9 +150,10 @@ def disk_error(error: OSError, where: Path) -> StoreError:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return StoreFullError(
             f"{where}: the disk is full; the version was not published and what was stored "
-            "before is unchanged. Free some space and run again."
+            "before is unchanged; free some space and run again."
         )
-    return StoreError(f"{where}: cannot be written ({error.strerror or error}).")
+    # The whole error: it names the file, which a lazy dataset may have wanted to read.
+    return StoreError(f"{where}: cannot be written ({error}).")
 
 
 def _fsync(path: Path) -> None:
@@ -178,7 +179,7 @@ def _arrays(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 def _chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
     """Whole trailing axes, leading ones split, so that a chunk is about CHUNK_TARGET_BYTES."""
-    chunks = list(shape)
+    chunks = [max(1, length) for length in shape]  # A chunk of an empty axis still has a length.
     for axis, length in enumerate(shape):
         row = itemsize * math.prod(chunks[axis + 1 :])
         chunks[axis] = max(1, min(length, CHUNK_TARGET_BYTES // max(row, 1)))

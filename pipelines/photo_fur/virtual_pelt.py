@@ -83,6 +83,7 @@ INDIRECT_STRIDE = 4
 WHITE_QUANTILE = 0.999
 SIDES = 3  # of a hair's prism
 PIXELS_PER_BLOCK = 1 << 17
+NUMBERS_PER_VERTEX = 5  # random: direction to the light (2), next direction (3)
 SKIN_CLEARANCE = 1e-5  # rays start at least this far above the skin: no skin shadows itself
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec. 709 weights
 
@@ -213,13 +214,13 @@ def _curves(
     count, clumps = len(roots), int(clump.max()) + 1
     lie = _lie_of_the_fur(length, rng)
     turn = rng.normal(0, 0.22, clumps)[clump] + coat.turn_spread * rng.normal(0, 1, count)
-    rise = rng.uniform(-0.25, 0.25, clumps)[clump]
-    root_tilt = _ROOT_TILT + rise + rng.uniform(-0.2, 0.2, count)
+    rise = rng.uniform(-0.12, 0.12, clumps)[clump]
+    root_tilt = _ROOT_TILT + rise + rng.uniform(-0.12, 0.12, count)
     # Bounded scatter: a single upright or overlong hair would set the top plane for all others.
     spread = coat.tilt_spread * rng.uniform(-1.7, 1.7, count)
     tip_tilt = _TIP_TILT + rise + spread
     step = length * coat.length / (POINTS_PER_HAIR - 1)
-    step = step * rng.uniform(0.75, 1.2, clumps)[clump] * rng.uniform(0.75, 1.2, count)
+    step = step * rng.uniform(0.88, 1.12, clumps)[clump] * rng.uniform(0.82, 1.12, count)
     # Neighbours wave nearly in phase: locks, not frizz.
     waviness = coat.waviness * rng.uniform(0.6, 1.4, clumps)[clump]
     phase = rng.uniform(0, 2 * math.pi, clumps)[clump] + rng.normal(0, 0.5, count)
@@ -310,7 +311,7 @@ def photograph_pelt(
         if value < least:
             raise ValueError(f"{name}: expected at least {least}, found {value}")
     fur = _Fur.of(hairs, np.asarray(skin_albedo, np.float32))
-    numbers = 2 + 4 * (bounces + 1)  # random numbers of a path: place in the pixel, 4 a vertex
+    numbers = 2 + NUMBERS_PER_VERTEX * (bounces + 1)  # the first two: a place in the pixel
     sobol = qmc.Sobol(numbers, seed=rng).random_base2(math.ceil(math.log2(samples)))
     indirect_samples = math.ceil(samples / INDIRECT_STRIDE)
     vertices = [bounces + 1 if k < indirect_samples else 1 for k in range(samples)]
@@ -463,7 +464,7 @@ def _path_radiance(
 ) -> FloatArray:
     """Estimate what comes up to the camera along paths of ``vertices`` scatterings: (N, 3).
 
-    random: (4 * vertices or more, N) numbers in [0, 1).
+    random: (NUMBERS_PER_VERTEX * vertices or more, N), in [0, 1).
     indirect_weight: of all light after the first scattering.
     """
     count = len(origins)
@@ -473,7 +474,7 @@ def _path_radiance(
     for vertex in range(vertices):
         hits = first_hits(fur.scene, origins, directions)
         out = _Scattered(*(np.empty((count, 3), np.float32) for _ in _Scattered._fields))
-        numbers = random[4 * vertex : 4 * vertex + 4]
+        numbers = random[NUMBERS_PER_VERTEX * vertex :][:NUMBERS_PER_VERTEX]
         _scatter(*hits, origins, directions, numbers, source_exponent, fur.fibres, out)
         lit = ~occluded(fur.scene, out.light_origin, out.light_direction)
         radiance += throughput * out.light_weight * lit[:, None]
@@ -528,7 +529,7 @@ def _exit_distance(radius: float, sine: float) -> float:
 def _scatter(
     distance, triangle, barycentric, origins, directions, random, exponent, fibres, out
 ):  # noqa: ANN001, ANN202 (numba infers)
-    """Fill ``out`` for each ray's first hit; random numbers (4, N): light (2), next ray (2)."""
+    """Fill ``out`` for each ray's first hit; random numbers (NUMBERS_PER_VERTEX, N)."""
     faces = len(fibres.segment)
     hair_triangles = faces * len(fibres.hair)
     source_weight = math.pi * (exponent + 2) / (exponent + 1)  # radiance over density
@@ -550,7 +551,7 @@ def _scatter(
             py = origins[i, 1] + distance[i] * directions[i, 1]
             pz = 0.0
             nx, ny, nz = a, b, math.sqrt(max(0.0, 1 - a * a - b * b))
-            light, onwards = source_weight * lz / math.pi, 1.0
+            light = source_weight * lz / math.pi
             light_start = next_start = 0.0
             albedo = fibres.skin_albedo
         else:
@@ -580,24 +581,30 @@ def _scatter(
             lobe = sine + BACKSCATTER * (ux * lx + uy * ly + uz * lz)
             light = source_weight * lobe / math.pi**2
             light_start = _exit_distance(radius, sine)
-            # Light from other hairs: density sin t / pi^2, so that 1 + BACKSCATTER cos p is left.
+            # Light from other hairs: p is uniform so far. Turning cos p round with probability
+            # (1 - BACKSCATTER cos p) / 2 leaves the density 1 + BACKSCATTER cos p, and weight 1.
             azimuth = math.pi * b / chord
             cu, cv = chord * math.cos(azimuth), chord * math.sin(azimuth)
-            nx, ny, nz = a * tx + cu * ux + cv * vx, a * ty + cu * uy + cv * vy, 0.0
+            if 2 * random[4, i] > 1 + BACKSCATTER * math.cos(azimuth):
+                cu = -cu
+            nx = a * tx + cu * ux + cv * vx
+            ny = a * ty + cu * uy + cv * vy
             nz = a * tz + cu * uz + cv * vz
-            onwards = 1 + BACKSCATTER * math.cos(azimuth)
             next_start = _exit_distance(radius, chord)
         out.light_origin[i, 0] = px + light_start * lx
         out.light_origin[i, 1] = py + light_start * ly
         out.light_origin[i, 2] = max(pz + light_start * lz, SKIN_CLEARANCE)
-        out.light_direction[i, 0], out.light_direction[i, 1] = lx, ly
+        out.light_direction[i, 0] = lx
+        out.light_direction[i, 1] = ly
         out.light_direction[i, 2] = lz
         # Back into the tile, around which there are copies on all sides.
         x, y = px + next_start * nx, py + next_start * ny
-        out.next_origin[i, 0], out.next_origin[i, 1] = x - math.floor(x), y - math.floor(y)
+        out.next_origin[i, 0] = x - math.floor(x)
+        out.next_origin[i, 1] = y - math.floor(y)
         out.next_origin[i, 2] = max(pz + next_start * nz, SKIN_CLEARANCE)
-        out.next_direction[i, 0], out.next_direction[i, 1] = nx, ny
+        out.next_direction[i, 0] = nx
+        out.next_direction[i, 1] = ny
         out.next_direction[i, 2] = nz
         for channel in range(3):
             out.light_weight[i, channel] = light * albedo[channel]
-            out.next_weight[i, channel] = onwards * albedo[channel]
+            out.next_weight[i, channel] = albedo[channel]

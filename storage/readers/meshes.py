@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 
 FORMATS = "a PLY, OBJ or GLB mesh"
 
-_PACKED_GEOMETRY = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"}
+_GL_FLOAT = 5126
+_PACKED_GEOMETRY = {
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "KHR_mesh_quantization",
+}
 
 
 class MeshFile(NamedTuple):
@@ -141,12 +147,12 @@ def _read_glb(file: Path) -> PolygonMesh:
     to the bottom left."""
     import trimesh
 
-    data = file.read_bytes()
-    _check_glb_header(file, data)
+    data = _geometry_only(file, file.read_bytes())
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
-        placed = [(scene.geometry[name], matrix) for name, matrix in _placements(scene)]
-    except Exception as error:  # by what is broken: KeyError, ValueError, IndexError, ...
+        nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+        placed = [(scene.geometry[name], np.asarray(matrix, float)) for matrix, name in nodes]
+    except Exception as error:  # by what is broken: KeyError, ValueError, AssertionError, ...
         raise BadInput(file, "content", "damaged", "a complete GLB file") from error
     positions, corners, uvs, count = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [], 0
     for geometry, matrix in placed:
@@ -156,6 +162,9 @@ def _read_glb(file: Path) -> PolygonMesh:
         if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns the triangles inside out
             triangles = triangles[:, ::-1]
         vertices = np.asarray(geometry.vertices, np.float64)
+        if triangles.max(initial=-1) >= len(vertices):  # would reach into the next one's vertices
+            found = f"a reference to vertex {triangles.max()}"
+            raise BadInput(file, "a triangle", found, f"vertices 0 to {len(vertices) - 1}")
         positions.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
         corners.append(triangles.ravel() + count)
         count += len(vertices)
@@ -170,12 +179,6 @@ def _read_glb(file: Path) -> PolygonMesh:
     )
 
 
-def _placements(scene: trimesh.Scene) -> list[tuple[Any, NDArray[np.float64]]]:
-    """Which geometry stands where: one entry for each node that shows one."""
-    nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
-    return [(name, np.asarray(matrix, np.float64)) for matrix, name in nodes]
-
-
 def _glb_uvs(geometry: trimesh.Trimesh, triangles: NDArray[np.int64]) -> NDArray[np.float64] | None:
     uv = getattr(geometry.visual, "uv", None)
     if uv is None or len(uv) != len(geometry.vertices):
@@ -183,17 +186,49 @@ def _glb_uvs(geometry: trimesh.Trimesh, triangles: NDArray[np.int64]) -> NDArray
     return np.asarray(uv, np.float64)[triangles.ravel()]
 
 
-def _check_glb_header(file: Path, data: bytes) -> None:
-    """glTF 2.0, 4.4: 12 bytes of header, then a chunk of JSON."""
+def _geometry_only(file: Path, data: bytes) -> bytes:
+    """A GLB (glTF 2.0, 4.4: header, a chunk of JSON, a binary chunk) as trimesh can read it:
+    every primitive with the same blank material. It drops the texture coordinates of a
+    primitive without a material, and decodes pictures that are not needed here."""
     try:
         version, length, json_length = struct.unpack_from("<4xIII", data)
         if len(data) < length:
             raise ValueError
         description = json.loads(data[20 : 20 + json_length])
         required = set(description.get("extensionsRequired", ()))
-    except (struct.error, ValueError, AttributeError, TypeError):
+        _check_plain(file, version, required, description)
+        for primitive in _primitives(description):
+            primitive["material"] = 0
+    except BadInput:
+        raise
+    except (struct.error, ValueError, AttributeError, TypeError, LookupError):
         raise BadInput(file, "content", "truncated or damaged", "a complete GLB file") from None
+    description["materials"] = [{}]
+    for unused in ("images", "textures", "samplers"):
+        description.pop(unused, None)
+    text = json.dumps(description).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + data[20 + json_length : length]
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _primitives(description: dict[str, Any]) -> list[dict[str, Any]]:
+    return [part for mesh in description.get("meshes", ()) for part in mesh["primitives"]]
+
+
+def _check_plain(file: Path, version: int, required: set[str], description: dict[str, Any]) -> None:
+    """Refuse what trimesh passes over in silence."""
     if version != 2:
         raise BadInput(file, "glTF version", str(version), "2")
     if packed := sorted(required & _PACKED_GEOMETRY):
         raise BadInput(file, "geometry", f"packed by {packed[0]}", "plain glTF 2.0 geometry")
+    for primitive in _primitives(description):
+        if primitive.get("mode", 4) == 6:
+            raise BadInput(file, "geometry", "a triangle fan", "triangles or strips")
+        attributes = primitive["attributes"]
+        for name in ("POSITION", "TEXCOORD_0"):
+            if name not in attributes:
+                continue
+            accessor = description["accessors"][attributes[name]]
+            if "sparse" in accessor or accessor["componentType"] != _GL_FLOAT:
+                raise BadInput(file, name, "sparse or of integers", "an accessor of floats")

@@ -168,10 +168,11 @@ def glb_bytes(
     positions: NDArray[np.float64] = POSITIONS,
     uvs: NDArray[np.float64] = UVS,
     mode: int = 4,
+    last: int = 0,
     **extra: Any,
 ) -> bytes:
     """The square as many times as ``with_uvs`` has entries; glTF's v counts from the top."""
-    indices = struct.pack("<6H", 0, 1, 2, 2, 3, 0)
+    indices = struct.pack("<6H", 0, 1, 2, 2, 3, last)
     stored_uvs = np.column_stack([uvs[:, 0], 1 - uvs[:, 1]]).astype("<f4").tobytes()
     parts = [indices, positions.astype("<f4").tobytes(), stored_uvs]
     views, offset = [], 0
@@ -274,26 +275,54 @@ REFUSED: list[tuple[str, str, Callable[[Path], Any]]] = [
     ("flat.ply", "face 0 is degenerate", text(ply_text(None, "4 0 0 0 1\n"))),
     ("nan.obj", "vertex 1 is (1, nan, 0)", text("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n")),
     ("inf.ply", "vertex 0 is (inf, 0, 5)", text(PLY.replace("\n0 0 5", "\ninf 0 5"))),
-    ("nan.glb", "vertex 0 is (nan, ", packed(glb_bytes([{"mesh": 0}], positions=POSITIONS * np.nan))),
+    (
+        "nan.glb",
+        "vertex 0 is (nan, ",
+        packed(glb_bytes([{"mesh": 0}], positions=POSITIONS * np.nan)),
+    ),
     ("uv.obj", "texture coordinate of corner 2 is (nan, 0)", text(CORNERS + "f 1/1 2/1 3/2\n")),
-    ("uv.glb", "texture coordinate of corner 2 is (0.75, nan)", packed(glb_bytes([{"mesh": 0}], uvs=NAN_UVS))),
-    ("index.obj", "line 7 is 'f 1 2 5'; expected references from 1 to the 4 vertices", text(CORNERS + "f 1 2 5\n")),
+    (
+        "uv.glb",
+        "texture coordinate of corner 2 is (0.75, nan)",
+        packed(glb_bytes([{"mesh": 0}], uvs=NAN_UVS)),
+    ),
+    (
+        "index.obj",
+        "line 7 is 'f 1 2 5'; expected references from 1 to the 4 vertices",
+        text(CORNERS + "f 1 2 5\n"),
+    ),
     ("zero.obj", "line 7 is 'f 0 1 2'", text(CORNERS + "f 0 1 2\n")),
     ("back.obj", "line 7 is 'f -5 1 2'", text(CORNERS + "f -5 1 2\n")),
     ("map.obj", "to the 2 texture coordinates", text(CORNERS + "f 1/1 2/2 3/3\n")),
     ("word.obj", "line 1 is 'v 1 two 3'; expected 3 numbers", text("v 1 two 3\n")),
     ("short.obj", "line 2 is 'v 1 2'; expected 3 numbers", text("v 1 2 3\nv 1 2")),
-    ("index.ply", "face 1 is a reference to vertex 4; expected vertices 0 to 3", text(ply_text(("s", "t"), "3 0 1 2\n3 0 1 4\n"))),
+    (
+        "index.ply",
+        "face 1 is a reference to vertex 4; expected vertices 0 to 3",
+        text(ply_text(("s", "t"), "3 0 1 2\n3 0 1 4\n")),
+    ),
     ("index.ply", "face 0 is a reference to vertex -1", text(ply_text(None, "3 0 1 -1\n"))),
     ("head.ply", "header is truncated", text(PLY[:60])),
     ("type.ply", "header is 'property real x'", text(PLY.replace("float x", "real x"))),
     ("format.ply", "header is without a format", text(PLY.replace("format ascii 1.0\n", ""))),
-    ("flat.ply", "vertex properties is x, y, depth, s, t", text(PLY.replace("double z", "double depth"))),
+    (
+        "flat.ply",
+        "vertex properties is x, y, depth, s, t",
+        text(PLY.replace("double z", "double depth")),
+    ),
     ("word.ply", "content is truncated or damaged", text(PLY.replace("4 0 1 2 3", "4 0 1 2 x"))),
     ("old.glb", "glTF version is 1", packed(b"glTF\1\0\0\0" + glb_bytes([{"mesh": 0}])[8:])),
     ("draco.glb", "geometry is packed by KHR_draco", packed(glb_bytes([{"mesh": 0}], **DRACO))),
-    ("index.glb", "content is damaged", packed(glb_bytes([{"mesh": 3}]))),
-]  # fmt: skip
+    (
+        "index.glb",
+        "a triangle is a reference to vertex 4",
+        packed(glb_bytes([{"mesh": 0}], last=4)),
+    ),
+    ("none.glb", "content is 0 points", packed(glb_bytes([{"mesh": 3}]))),
+    ("fan.glb", "geometry is a triangle fan", packed(glb_bytes([{"mesh": 0}], mode=6))),
+    ("views.glb", "content is damaged", packed(glb_bytes([{"mesh": 0}], bufferViews=[]))),
+    ("links.glb", "content is truncated or damaged", packed(glb_bytes([{"mesh": 0}], meshes=[0]))),
+]
 
 
 def one_sentence(error: BadInput, file: str) -> str:

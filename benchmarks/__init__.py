@@ -1,0 +1,1 @@
+"""Figures, not timed tests: ``python -m benchmarks NAME`` prints one JSON object, last line."""

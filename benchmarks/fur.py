@@ -1,0 +1,320 @@
+"""Figures of the fur system: exactness from above, cost against the usual shells, overheads."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from assets_defs.workspace import CHECKOUT
+from pipelines import geometry
+from pipelines.colour import decode_srgb, encode_srgb, luminance
+from pipelines.photo_fur.attenuation import (
+    Attenuation,
+    depth_rank_correlation,
+    fit_attenuation,
+    layer_masks,
+    layer_of,
+)
+from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.frames import (
+    BACKGROUND,
+    SQUARE_VIEWS,
+    draw_frames,
+    square_of_photograph,
+    top_view_error,
+)
+from pipelines.photo_fur.shells import shell_vertices
+from pipelines.photo_fur.virtual_pelt import virtual_pelt
+from pipelines.stage import Light, Shader, Stage, orbit, surface, texture
+from storage.readers.photographs import builtin_photograph
+
+LAYERS = 15
+TAIL = 0.005
+WINDOW = (640, 480)
+FRAMES = 21
+PELT = {"size": 512, "hairs": 9000, "samples": 16}
+SEEDS = (0, 1, 2)
+
+
+class Photograph(NamedTuple):
+    """A photograph with its medium."""
+
+    radiance: NDArray[np.float32]
+    luminance: NDArray[np.floating]
+    attenuation: Attenuation
+
+
+def run() -> dict[str, Any]:
+    """All figures, keyed as the documentation names them."""
+    console = Console(stderr=True)
+    figures: dict[str, Any] = {}
+    steps: Sequence[tuple[str, Callable[[], dict[str, Any]]]] = (
+        ("from above", _top_view),
+        ("depth on the virtual pelt", _depth),
+        ("photograph to masks", _derive),
+        ("frames against the usual shells", _frames),
+        ("frames a second", _speeds),
+        ("import", _import),
+        ("demo's overhead", _demo),
+    )
+    for name, measure in steps:
+        started = time.perf_counter()
+        figures |= measure()
+        console.print(f"{name}: {time.perf_counter() - started:.0f} s", highlight=False)
+    return figures
+
+
+# ---- exactness -------------------------------------------------------------------------------
+
+
+def _photograph(name: str) -> Photograph:
+    radiance = builtin_photograph(name)
+    grey = luminance(radiance)
+    return Photograph(radiance, grey, fit_attenuation(grey, tail=TAIL))
+
+
+def _top_view() -> dict[str, Any]:
+    """Worst of the photographs; tails in the end layers, one texel a pixel, nearest, unlit."""
+    errors = {}
+    for name in ("grass", "chelsea"):
+        photo = _photograph(name)
+        mesh = geometry.square(32)
+        shells = shell_vertices(mesh.vertices, mesh.normals, 0.05, 8)
+        shape = photo.luminance.shape
+        drawn = draw_frames(
+            *photo,
+            square_of_photograph(shells, (shape[0], shape[1])),
+            mesh.normals,
+            mesh.triangles,
+            mesh.uvs,
+            SQUARE_VIEWS[:1],
+            size=(shape[0], shape[1]),
+            supersampling=1,
+            tails="end layers",
+            fill="columns",
+            progress=lambda fraction: None,
+        )
+        errors[name] = top_view_error(drawn.pictures[0], photo.radiance)
+    return {"top_view_rmse": max(errors.values()), "top_view_rmse_each": errors}
+
+
+def _depth() -> dict[str, Any]:
+    correlations = []
+    for seed in SEEDS:
+        pelt = virtual_pelt(PELT["size"], PELT["hairs"], PELT["samples"], seed)
+        correlations.append(depth_rank_correlation(luminance(pelt.radiance), pelt.depth))
+    return {
+        "depth_rank_correlation": statistics.mean(correlations),
+        "depth_rank_correlation_seeds": correlations,
+    }
+
+
+def _derive() -> dict[str, Any]:
+    """A 512 x 512 photograph's luminance to 15 masks; median of 11."""
+    grey = luminance(builtin_photograph("grass"))
+
+    def derive() -> None:
+        attenuation = fit_attenuation(grey, tail=TAIL)
+        layer_masks(layer_of(grey, attenuation, LAYERS, tails="end layers"), LAYERS)
+
+    return {"derive_ms": 1000 * statistics.median(_time(derive) for _ in range(11))}
+
+
+# ---- drawing ---------------------------------------------------------------------------------
+
+
+def _large() -> tuple[geometry.Mesh, NDArray[np.float32]]:
+    mesh = geometry.teapot(33)
+    return mesh, shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
+
+
+def _ours(photo: Photograph, mesh: geometry.Mesh, shells: NDArray[np.float32], fill: Fill) -> Any:
+    image = fur_texture(*photo, LAYERS, tails="end layers")
+    return fur_surface(
+        shells,
+        mesh.normals,
+        mesh.triangles,
+        mesh.uvs,
+        image,
+        photo.attenuation,
+        fill=fill,
+        wrap="mirrored",
+        interpolate=False,
+        lit=True,
+    )
+
+
+def _layer_images(photo: Photograph, fill: Fill) -> list[NDArray[np.uint8]]:
+    """What the usual shells keep: an RGBA8 texture a layer that says where there is hair."""
+    layer = layer_of(photo.luminance, photo.attenuation, LAYERS, tails="end layers")
+    colours = decode_srgb(np.rint(encode_srgb(photo.radiance) * 255) / 255)
+    images = []
+    for number in range(1, LAYERS + 1):
+        shown = layer == number if fill == "bands" else layer <= number
+        step = np.exp(photo.attenuation.coefficient / LAYERS * (layer.astype(float) - number))
+        codes = np.rint(encode_srgb(colours * np.minimum(step, 1.0)[..., None]) * 255)
+        images.append(np.dstack([codes, shown * 255]).astype(np.uint8))
+    return images
+
+
+def _usual(
+    photo: Photograph, mesh: geometry.Mesh, shells: NDArray[np.float32], fill: Fill
+) -> tuple[list[Any], list[Any]]:
+    """A texture and a draw a layer, tips first as ours; everything else as ours."""
+    shader = Shader(
+        vertex={
+            "TCoord::Dec": "in vec2 uv; out vec2 uvOut;",
+            "TCoord::Impl": "uvOut = uv;",
+        },
+        fragment={
+            "TCoord::Dec": "in vec2 uvOut;",
+            "Color::Impl": """//VTK::Color::Impl
+  vec4 texel = texture(photograph, uvOut);
+  if (texel.a < 0.5) discard;
+  ambientColor = vec3(0.0);
+  diffuseColor = texel.rgb;
+""",
+        },
+    )
+    textures = [
+        texture(image, wrap="mirrored", interpolate=False, srgb=True)
+        for image in _layer_images(photo, fill)
+    ]
+    actors = [
+        surface(
+            vertices,
+            mesh.triangles,
+            normals=mesh.normals,
+            attributes={"uv": mesh.uvs},
+            textures={"photograph": image},
+            shader=shader,
+        )
+        for vertices, image in zip(shells, textures, strict=True)
+    ]
+    return actors, textures
+
+
+def _frames() -> dict[str, Any]:
+    """Both sides on one stage, frames in turns; the medians' ratio. Their pictures must agree."""
+    photo = _photograph("grass")
+    mesh, shells = _large()
+    pixels = photo.luminance.size
+    figures: dict[str, Any] = {
+        "vertices": len(mesh.vertices),
+        "layers": LAYERS,
+        "texture_bytes": 4 * pixels,
+        "texture_bytes_usual": 4 * pixels * LAYERS,
+        "texture_bytes_ratio": 1 / LAYERS,
+    }
+    for fill, suffix in (("columns", ""), ("bands", "_bands")):
+        with Stage(*WINDOW, background=BACKGROUND) as stage:
+            ours = [_ours(photo, mesh, shells, fill)]
+            usual, textures = _usual(photo, mesh, shells, fill)
+            stage.light(Light())
+            stage.add(*ours, *usual)
+            stage.look(_view(mesh))
+            pictures = {}
+            times: dict[str, list[float]] = {"ours": [], "usual": [], "uploading": []}
+
+            def draw(side: str, stage: Stage = stage, textures: list[Any] = textures) -> None:
+                if side == "uploading":
+                    for image in textures:
+                        image.Modified()
+                        image.GetInput().Modified()
+                stage.draw()
+
+            for turn in range(FRAMES + 1):
+                for side in times:
+                    for actor in ours:
+                        actor.SetVisibility(side == "ours")
+                    for actor in usual:
+                        actor.SetVisibility(side != "ours")
+                    spent = _time(lambda side=side: draw(side))  # type: ignore[misc]
+                    if turn:
+                        times[side].append(spent)
+                    else:
+                        pictures[side] = stage.frame().astype(int)
+            medians = {side: statistics.median(spent) for side, spent in times.items()}
+            step = int(np.abs(pictures["ours"] - pictures["usual"]).max())
+        figures |= {
+            f"frame_ratio{suffix}": medians["ours"] / medians["usual"],
+            f"upload_frame_ratio{suffix}": medians["ours"] / medians["uploading"],
+            f"frame_ms{suffix}": 1000 * medians["ours"],
+            f"frame_largest_step{suffix}": step,
+        }
+    return figures
+
+
+def _speeds() -> dict[str, Any]:
+    photo = _photograph("grass")
+    figures: dict[str, Any] = {}
+    for name, segments in (("fps_teapot", 8), ("fps_large", 33)):
+        mesh = geometry.teapot(segments)
+        shells = shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
+        with Stage(*WINDOW, background=BACKGROUND) as stage:
+            stage.light(Light())
+            stage.add(_ours(photo, mesh, shells, "columns"))
+            stage.look(_view(mesh))
+            stage.draw()
+            figures[name] = 1 / statistics.median(_time(stage.draw) for _ in range(FRAMES))
+            figures[f"vertices_{name.removeprefix('fps_')}"] = len(mesh.vertices)
+            figures["renderer"] = stage.renderer_name
+    return figures | {"window": list(WINDOW)}
+
+
+def _view(mesh: geometry.Mesh) -> Any:
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    x, y, z = (low + high) / 2
+    radius = float(np.linalg.norm(mesh.vertices - (x, y, z), axis=1).max()) + 0.06
+    return orbit((x, y, z), radius / np.sin(np.radians(15)), -60.0, 22.0)
+
+
+# ---- overheads -------------------------------------------------------------------------------
+
+
+def _import() -> dict[str, Any]:
+    code = "import time; t = time.perf_counter(); import assets_defs.entry; "
+    code += "print(time.perf_counter() - t)"
+    spent = [
+        float(subprocess.check_output([sys.executable, "-c", code], cwd=CHECKOUT))
+        for _ in range(5)
+    ]
+    return {"import_definitions_s": min(spent)}
+
+
+def _demo() -> dict[str, Any]:
+    """The demo's fur with an empty store and history, in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder) / "dagster"
+        home.mkdir()
+        (home / "dagster.yaml").write_text("telemetry: {enabled: false}\n")
+        surroundings = os.environ | {
+            "DAGSTER_HOME": str(home),
+            "TSUYA_DATA": str(Path(folder) / "data"),
+        }
+        command = [str(Path(sys.executable).parent / "tsuya"), "run", "photo_fur"]
+        command += ["--preset", "demo", "--json"]
+        started = time.perf_counter()
+        done = subprocess.run(command, env=surroundings, check=True, capture_output=True, text=True)
+        wall = time.perf_counter() - started
+    report = json.loads(done.stdout.splitlines()[-1])
+    steps = sum(asset["seconds"] for asset in report["assets"])
+    return {"demo_s": wall, "demo_steps_s": steps, "demo_overhead_ratio": 1 - steps / wall}
+
+
+def _time(function: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    function()
+    return time.perf_counter() - started

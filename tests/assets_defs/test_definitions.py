@@ -1,0 +1,241 @@
+"""What Dagster sees: the graph's shape, the schedule, the sensor, the IO manager's events."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import dagster as dg
+import numpy as np
+import pytest
+from PIL import Image
+
+from assets_defs.definitions import SYSTEMS
+from assets_defs.inbox import SETTLED_SECONDS
+from assets_defs.launcher import Request
+from assets_defs.photo_fur import FUR
+from assets_defs.system import partition_key
+from storage.schemas import schemas_of
+from storage.versions import Slot
+
+
+def test_dagster_validates_the_workspace(tmp_path: Path) -> None:
+    checkout = Path(__file__).parents[2]
+    done = subprocess.run(
+        [str(Path(sys.executable).parent / "dagster"), "definitions", "validate"]
+        + ["-w", "workspace.yaml"],
+        cwd=checkout,
+        env=os.environ | {"DAGSTER_HOME": str(tmp_path), "TSUYA_DATA": str(tmp_path / "data")},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "PreviewWarning" not in done.stderr
+
+
+def test_importing_the_definitions_imports_nothing_heavy() -> None:
+    heavy = ("xarray", "zarr", "dask", "pyvista", "vtkmodules", "open3d", "scipy", "skimage")
+    code = "import sys, assets_defs.entry; print([m for m in %r if m in sys.modules])" % (heavy,)
+    checkout = Path(__file__).parents[2]
+    printed = subprocess.check_output([sys.executable, "-c", code], cwd=checkout, text=True)
+    assert printed.strip() == "[]"
+
+
+def test_the_graph_has_the_papers_shape(house: Any) -> None:
+    graph = house.definitions.get_repository_def().asset_graph
+    key = {name: dg.AssetKey(["photo_fur", name]) for name in FUR.plans}
+    parents = {name: {parent.path[-1] for parent in graph.get(key[name]).parent_keys} for name in key}
+    assert parents == {
+        "fur_photo": set(),
+        "attenuation": {"fur_photo"},
+        "shell_stack": {"fur_photo", "attenuation"},
+        "shell_mesh": set(),
+        "fur_frames": {"fur_photo", "attenuation", "shell_mesh"},
+    }
+    for system in SYSTEMS.values():
+        assert [plan.schema for plan in system.plans.values()] == list(schemas_of(system.name))
+        for plan in system.plans.values():
+            node = graph.get(dg.AssetKey([system.name, plan.name]))
+            assert node.group_name == system.name
+            assert node.owners
+            assert node.kinds >= {"zarr"}
+            assert "| variable |" in (node.description or "")
+            assert node.partitions_def is not None
+            assert node.code_version == plan.code
+            columns = node.metadata["dagster/column_schema"].columns
+            assert [column.name for column in columns] == list(plan.schema.variables)
+
+
+def test_every_check_blocks_and_knows_its_partitions(house: Any) -> None:
+    graph = house.definitions.get_repository_def().asset_graph
+    expected = {
+        (system.name, plan.name, check.name)
+        for system in SYSTEMS.values()
+        for plan in system.plans.values()
+        for check in plan.checks
+    }
+    found = {(*key.asset_key.path, key.name) for key in graph.asset_check_keys}
+    assert found == expected
+    for key in graph.asset_check_keys:
+        spec = graph.get_check_spec(key)
+        assert spec.blocking
+        assert spec.partitions_def == graph.get(key.asset_key).partitions_def
+
+
+def test_a_materialisation_tells_version_size_data_version_and_picture(house: Any) -> None:
+    house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test"))
+    slot = Slot("photo_fur", "fur_photo", "grass")
+    record = house.workspace.store.record(slot)
+    event = house.instance.get_latest_materialization_event(dg.AssetKey(["photo_fur", "fur_photo"]))
+    metadata = event.asset_materialization.metadata
+    assert metadata["version"].value == record["version"]
+    assert metadata["bytes in memory"].value == record["array_bytes"]
+    assert Path(metadata["folder"].value) == house.workspace.store.folder(slot)
+    assert metadata["settings"].value == record["settings"]
+    assert metadata["photograph"].value.startswith("![picture](data:image/jpeg;base64,")
+    assert len(metadata["photograph"].value) < 100_000
+    assert event.asset_materialization.tags["dagster/data_version"] == record["content"]
+
+
+def test_a_run_that_names_no_settings_repeats_those_of_the_current_version(house: Any) -> None:
+    """What the UI's Materialize button and an asset backfill do."""
+    house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test", {"layers": 5}))
+    job = house.definitions.get_repository_def().get_job("photo_fur_photo")
+    done = job.execute_in_process(instance=house.instance, partition_key="grass")
+    assert done.success
+    store = house.workspace.store
+    slots = [Slot("photo_fur", name, "grass") for name in ("attenuation", "shell_stack")]
+    assert [store.record(slot)["settings"]["layers"] for slot in slots] == [5, 5]
+    # Nothing was skipped, although all of it was current.
+    made = {event.asset_key.path[-1] for event in done.get_asset_materialization_events()}
+    assert made == {"fur_photo", "attenuation", "shell_stack"}
+
+
+def test_the_schedule_makes_again_what_was_made(house: Any) -> None:
+    keys = {"photo": "grass", "mesh": "square"}
+    house.launcher.launch(Request(FUR, [keys], "test"))
+    (schedule,) = house.definitions.schedules
+    assert schedule.default_status == dg.DefaultScheduleStatus.RUNNING
+    context = dg.build_schedule_context(
+        instance=house.instance, repository_def=house.definitions.get_repository_def()
+    )
+    request = schedule.evaluate_tick(context).run_requests[0]
+    before = _materialisations(house)
+    job = house.definitions.get_repository_def().get_job("launch")
+    assert job.execute_in_process(run_config=request.run_config, instance=house.instance).success
+    after = _materialisations(house)
+    assert after["fur_frames"] == before["fur_frames"] + 1
+    assert after["fur_photo"] == before["fur_photo"] + 1
+
+
+def _materialisations(house: Any) -> dict[str, int]:
+    counts = {}
+    for name in FUR.plans:
+        events = house.instance.fetch_materializations(
+            dg.AssetKey(["photo_fur", name]), limit=1000
+        )
+        counts[name] = len(events.records)
+    return counts
+
+
+# ---- the inbox -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def dropped(make_house: Any) -> Any:
+    """A house of its own with a photograph in the inbox, settled."""
+    house = make_house()
+    inbox = house.workspace.inbox("photo_fur")
+    inbox.mkdir(parents=True)
+    noise = np.random.default_rng(2).integers(0, 256, (80, 80, 3), dtype=np.uint8)
+    path = inbox / "Mein Fell.png"
+    Image.fromarray(noise).save(path)
+    _settle(path)
+    return house
+
+
+def _settle(path: Path, seconds: float = SETTLED_SECONDS + 1) -> None:
+    past = time.time() - seconds
+    os.utime(path, (past, past))
+
+
+def _tick(house: Any, cursor: str | None) -> dg.SensorResult:
+    (sensor,) = house.definitions.sensors
+    context = dg.build_sensor_context(
+        instance=house.instance,
+        cursor=cursor,
+        repository_def=house.definitions.get_repository_def(),
+    )
+    result = sensor.evaluate_tick(context)
+    for request in result.dynamic_partitions_requests:
+        house.instance.add_dynamic_partitions(
+            request.partitions_def_name, request.partition_keys
+        )
+    return result
+
+
+def test_a_dropped_photograph_is_registered_and_its_run_makes_frames(dropped: Any) -> None:
+    tick = _tick(dropped, None)
+    (request,) = tick.run_requests
+    photos = dropped.instance.get_dynamic_partitions("photo_fur_photo")
+    (key,) = set(photos) - set(FUR.dimension("photo").builtin)
+    assert key.startswith("mein-fell-")
+    assert set(dropped.instance.get_dynamic_partitions("photo_fur_mesh")) == set(
+        FUR.dimension("mesh").builtin
+    )
+    config = request.run_config["ops"]["launch_graph"]["config"]
+    assert config["partitions"] == [{"photo": key, "mesh": FUR.dimension("mesh").default}]
+    job = dropped.definitions.get_repository_def().get_job("launch")
+    done = job.execute_in_process(run_config=request.run_config, instance=dropped.instance)
+    assert done.success
+    keys = {"photo": key, "mesh": FUR.dimension("mesh").default}
+    assert dropped.workspace.store.current(FUR.slot("fur_frames", keys))
+    runs = {run.job_name for run in dropped.instance.get_runs()}
+    assert {FUR.job_name(by) for by in FUR.grains()} <= runs
+    assert dropped.instance.get_run_partition_data is not None
+    assert partition_key(keys) == f"{keys['mesh']}|{key}"
+    # The same file again: nothing.
+    assert _tick(dropped, tick.cursor).run_requests == []
+
+
+def test_a_changed_file_is_made_again_and_one_on_its_way_is_left_alone(dropped: Any) -> None:
+    first = _tick(dropped, None)
+    (path,) = dropped.workspace.inbox("photo_fur").iterdir()
+    path.touch()
+    moving = _tick(dropped, first.cursor)
+    assert moving.run_requests == []
+    _settle(path, 60)
+    settled = _tick(dropped, moving.cursor)
+    assert len(settled.run_requests) == 1
+    assert settled.run_requests[0].run_key != first.run_requests[0].run_key
+
+
+def test_a_file_that_the_command_line_registered_is_not_run_twice(dropped: Any) -> None:
+    (path,) = dropped.workspace.inbox("photo_fur").iterdir()
+    key = next(k for k, s in FUR.sources("photo", path.parent).items() if s.path == path)
+    dropped.instance.add_dynamic_partitions("photo_fur_photo", [key])
+    tick = _tick(dropped, None)
+    assert tick.run_requests == []
+    assert json.loads(tick.cursor)
+
+
+def test_a_dropped_file_that_is_no_photograph_fails_with_its_sentence(make_house: Any) -> None:
+    house = make_house()
+    inbox = house.workspace.inbox("photo_fur")
+    inbox.mkdir(parents=True)
+    (inbox / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n truncated")
+    _settle(inbox / "broken.png")
+    (request,) = _tick(house, None).run_requests
+    job = house.definitions.get_repository_def().get_job("launch")
+    done = job.execute_in_process(
+        run_config=request.run_config, instance=house.instance, raise_on_error=False
+    )
+    assert not done.success
+    failure = next(event for event in done.all_events if event.is_step_failure)
+    assert "broken.png" in str(failure.step_failure_data.error)
+    assert list(house.workspace.store.slots()) == []

@@ -1,0 +1,209 @@
+"""The fur graph at its smallest, and a planted regression for every one of its checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from assets_defs.launcher import LaunchError, Request
+from assets_defs.photo_fur import FUR
+from pipelines import geometry
+from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells, virtual_pelt
+from storage.versions import Slot
+
+KEYS = {"photo": "grass", "mesh": "square"}
+PELT_KEYS = {"photo": "pelt", "mesh": "teapot"}
+
+
+@pytest.fixture(scope="module")
+def good(house: Any) -> Any:
+    """The house with the whole graph made once."""
+    for keys in (KEYS, PELT_KEYS):
+        house.launcher.launch(Request(FUR, [keys], preset="test"))
+    return house
+
+
+def test_every_asset_is_current_and_has_passed_every_check(good: Any) -> None:
+    for keys in (KEYS, PELT_KEYS):
+        for plan in FUR.plans.values():
+            slot = FUR.slot(plan.name, {name: keys[name] for name in plan.by})
+            pointer = good.workspace.store.pointer(slot)
+            assert pointer.version is not None
+            assert pointer.candidates == ()
+            verdicts = good.workspace.store.verdicts(slot, pointer.version)
+            assert set(verdicts) == {check.name for check in plan.checks}
+            assert all(verdict["passed"] for verdict in verdicts.values())
+
+
+def test_frames_show_the_photograph_from_above(good: Any) -> None:
+    store = good.workspace.store
+    picture = store.open(Slot("photo_fur", "fur_frames", "square.grass"))["frames"].values[0]
+    photo = store.open(Slot("photo_fur", "fur_photo", "grass"))["radiance"].values
+    encoded = np.where(photo <= 0.0031308, 12.92 * photo, 1.055 * photo ** (1 / 2.4) - 0.055)
+    assert np.abs(picture / 255 - encoded).max() <= 0.5 / 255 + 1e-6
+
+
+def test_a_second_launch_makes_nothing_and_a_forced_one_everything(good: Any) -> None:
+    store = good.workspace.store
+    before = {slot: store.current(slot) for slot in store.slots()}
+    outcomes = good.launcher.launch(Request(FUR, [KEYS]))
+    assert {outcome.state for outcome in outcomes} == {"current"}
+    outcomes = good.launcher.launch(Request(FUR, [KEYS], force=True))
+    assert {outcome.state for outcome in outcomes} == {"made"}
+    # The same settings give the same content, and equal content makes no new version.
+    assert {slot: store.current(slot) for slot in store.slots()} == before
+
+
+def test_one_setting_remakes_only_what_depends_on_it(good: Any) -> None:
+    outcomes = good.launcher.launch(Request(FUR, [KEYS], given={"size": 64}))
+    assert [outcome.slot.asset for outcome in outcomes if outcome.state == "made"] == ["fur_frames"]
+    # … and is remembered.
+    outcomes = good.launcher.launch(Request(FUR, [KEYS]))
+    assert {outcome.state for outcome in outcomes} == {"current"}
+    good.launcher.launch(Request(FUR, [KEYS], preset="test"))
+
+
+# ---- planted regressions ---------------------------------------------------------------------
+
+
+class Regression(NamedTuple):
+    """A bug put into the numerics, and the check that must find it."""
+
+    check: str
+    home: Any
+    name: str
+    wrong: Callable[..., Any]
+    """Called with the right function and then its arguments."""
+    keys: dict[str, str] = KEYS
+
+
+def _dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    return np.full_like(right(*arguments, **options), attenuation.DROPPED)
+
+
+def _half_dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    code = right(*arguments, **options)
+    code[::2] = attenuation.DROPPED
+    return code
+
+
+def _linear_layers(
+    right: Callable[..., Any], grey: Any, medium: Any, layers: int, **options: Any
+) -> Any:
+    depth = (medium.brightest - grey) / (medium.brightest - medium.darkest)
+    return np.clip(np.floor(depth * layers) + 1, 1, layers).astype(np.uint8)
+
+
+def _doubled_masks(right: Callable[..., Any], layer: Any, layers: int) -> Any:
+    masks = right(layer, layers)
+    masks[0] |= masks[-1]
+    return masks
+
+
+def _stretched_teapot(right: Callable[..., Any], segments: int) -> Any:
+    mesh = right(segments)
+    return geometry.Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
+
+
+def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    pelt = right(*arguments, **options)
+    pixels = pelt.radiance.reshape(-1, 3)
+    shuffled = np.random.default_rng(0).permutation(pixels).reshape(pelt.radiance.shape)
+    return pelt._replace(radiance=shuffled)
+
+
+REGRESSIONS = (
+    Regression(
+        "contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5
+    ),
+    Regression(
+        "clipped_share", photograph, "expose", lambda right, photo: np.clip(right(photo) * 6, 0, 1)
+    ),
+    Regression(
+        "kept_share",
+        attenuation,
+        "fit_attenuation",
+        lambda right, grey, tail: right(grey, tail=0.2),
+    ),
+    Regression(
+        "decay_error",
+        attenuation.Attenuation,
+        "boundaries",
+        lambda right, self, layers: np.linspace(self.brightest, self.darkest, layers + 1),
+    ),
+    Regression("depth_rank_correlation", virtual_pelt, "virtual_pelt", _shuffled_pelt, PELT_KEYS),
+    Regression("partition_error", attenuation, "layer_masks", _doubled_masks),
+    Regression("interval_error", attenuation, "layer_of", _linear_layers),
+    Regression(
+        "step_error",
+        shells,
+        "shell_heights",
+        lambda right, thickness, layers: right(thickness, layers) ** 2 / thickness,
+    ),
+    Regression("texture_stretch", geometry, "teapot", _stretched_teapot, PELT_KEYS),
+    Regression("top_view_rmse", drawing, "depth_code", _half_dropped),
+    Regression("least_coverage", drawing, "depth_code", _dropped),
+    Regression("mean_brightness", frames, "to_8bit", lambda right, picture: right(picture * 0.8)),
+)
+
+
+def test_every_check_has_a_planted_regression() -> None:
+    names = {check.name for plan in FUR.plans.values() for check in plan.checks}
+    assert {regression.check for regression in REGRESSIONS} == names
+
+
+@pytest.mark.parametrize("regression", REGRESSIONS, ids=lambda regression: regression.check)
+def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
+    good: Any, regression: Regression, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = good.workspace.store
+    before = {slot: store.pointer(slot) for slot in store.slots()}
+    content = {slot: store.record(slot)["content"] for slot in before}
+    right = getattr(regression.home, regression.name)
+    monkeypatch.setattr(
+        regression.home,
+        regression.name,
+        lambda *arguments, **options: regression.wrong(right, *arguments, **options),
+    )
+    with pytest.raises(LaunchError):
+        good.launcher.launch(Request(FUR, [regression.keys], force=True))
+    failed = {
+        check
+        for slot in before
+        for version in store.versions(slot)
+        if version > max(p.version for p in before.values() if p.version)
+        for check, verdict in store.verdicts(slot, version).items()
+        if not verdict["passed"]
+    }
+    assert regression.check in failed
+    assert {slot: store.pointer(slot).version for slot in before} == {
+        slot: pointer.version for slot, pointer in before.items()
+    }
+    assert {slot: store.record(slot)["content"] for slot in before} == content
+    monkeypatch.undo()
+    for slot in before:
+        store.open(slot).load()
+    good.launcher.launch(Request(FUR, [regression.keys]))
+
+
+def test_a_step_inside_the_bound_is_a_regression_too(
+    good: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slightly darker picture passes the bounds, not the comparison with the last good one."""
+    store = good.workspace.store
+    slot = Slot("photo_fur", "fur_frames", "teapot.pelt")
+    before = store.current(slot)
+    monkeypatch.setattr(frames, "BACKGROUND", (0.2, 0.2, 0.2))
+    with pytest.raises(LaunchError, match="last good version"):
+        good.launcher.launch(Request(FUR, [PELT_KEYS], force=True))
+    assert store.current(slot) == before
+    # Other settings are another lineage: there is nothing to compare with.
+    good.launcher.launch(Request(FUR, [PELT_KEYS], force=True, given={"size": 80}))
+    assert store.current(slot) != before
+
+
+def test_slots_read_their_partitions_in_the_order_of_the_dimensions_names() -> None:
+    assert FUR.slot("fur_frames", KEYS) == Slot("photo_fur", "fur_frames", "square.grass")
