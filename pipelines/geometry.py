@@ -3,9 +3,9 @@
 Texture coordinates (u, v) count photographs: (0, 0) is the bottom left and (1, 1) the top right
 corner of one, u to the right. Outside [0, 1] the photograph is repeated, mirrored at every whole
 number, which makes its value an even function of u. The closed charts made here lie evenly about
-u = 0, so that their two ends show the same column and the seam cannot be seen, also after the
-coordinates are scaled about 0. On surfaces, charts are (near to) conformal: the photograph is
-scaled and turned, but neither stretched nor mirrored, seen from outside.
+u = 0: their two ends show the same column, so that the seam cannot be seen, also after the
+coordinates were scaled about 0 (for smaller fur, or a photograph that is not square). Charts are
+nearly isometric, and seen from outside the photograph is not mirrored but where it repeats.
 """
 
 from __future__ import annotations
@@ -30,9 +30,11 @@ from pipelines.teapot_patches import (
     swept_quarter,
 )
 
-# The middle of the box around Newell's teapot, and the radius of the sphere around it.
-_TEAPOT_CENTRE = (0.2169, 0.0, 1.575)
-_TEAPOT_RADIUS = 3.3
+# The middle of the box around Newell's teapot, and the radius of the sphere around that.
+_NEWELL_CENTRE = np.array([0.21703756, 0.0, 1.575])
+_NEWELL_RADIUS = 3.34029113
+
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,10 @@ def vertex_normals(
     np.add.at(shared, position, own)
     summed = np.where(_length(shared[position]) > 1e-9, shared[position], own)
     length = _length(summed)
-    return np.where(length > 1e-9, summed / np.maximum(length, 1e-9), [0.0, 0.0, 1.0])
+    normals: NDArray[np.float64] = np.where(
+        length > 1e-9, summed / np.maximum(length, 1e-9), np.array([0.0, 0.0, 1.0])
+    )
+    return normals
 
 
 def unwrap(
@@ -103,9 +108,9 @@ def unwrap(
     """Texture coordinates for a mesh that has none, by xatlas.
 
     Returns vertices (V', 3), split along the charts' borders; triangles (F, 3) in the given
-    order; and uvs (V', 2). Charts keep angles and areas as far as xatlas manages; a photograph
-    is as wide as the radius of the sphere about the middle of the mesh's box, so that the charts
-    together cover more than one. The charts' borders show as seams.
+    order; and uvs (V', 2). Charts are nearly isometric: a photograph is a square as wide as the
+    radius of the sphere around the mesh (about the middle of its box) everywhere. Their borders
+    show as seams, and they may overlap on the photograph.
 
     Raises ValueError for a mesh whose vertices all are at one position.
     """
@@ -124,7 +129,27 @@ def unwrap(
     atlas.generate(pack_options=options)
     sources, faces, uvs = atlas[0]
     size = np.array([atlas.width, atlas.height], np.float64)
-    return vertices[sources], faces.astype(np.int64), uvs * size / options.texels_per_unit
+    faces = faces.astype(np.int64)
+    return vertices[sources], faces, _not_mirrored(uvs * size / options.texels_per_unit, faces)
+
+
+def _not_mirrored(uvs: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Charts that show the photograph mirrored (xatlas does not care) turned over in place."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = triangles.ravel(), np.roll(triangles, 1, axis=1).ravel()
+    links = coo_array((np.ones(triangles.size), pairs), shape=(len(uvs), len(uvs)))
+    count, chart = connected_components(links, directed=False)
+    a, b, c = np.moveaxis(uvs[triangles], 1, 0)
+    doubled_area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    mirrored = np.bincount(chart[triangles[:, 0]], doubled_area, count) < 0
+    left, right = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(left, chart, uvs[:, 0])
+    np.maximum.at(right, chart, uvs[:, 0])
+    turned = uvs.copy()
+    turned[:, 0] = np.where(mirrored[chart], (left + right)[chart] - uvs[:, 0], uvs[:, 0])
+    return turned
 
 
 def _check_arrays(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> None:
@@ -151,7 +176,8 @@ def _angle_weighted_normals(
     normal = np.cross(after, before)
     doubled_area = _length(normal)
     angle = np.arctan2(doubled_area, (after * before).sum(axis=-1, keepdims=True))
-    return normal / np.maximum(doubled_area, np.finfo(float).tiny) * angle
+    weighted: NDArray[np.float64] = angle * normal / np.maximum(doubled_area, _TINY)
+    return weighted
 
 
 def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -170,7 +196,7 @@ def square(segments: int = 1) -> Mesh:
     """
     _check_segments(segments, 1)
     steps = np.linspace(0.0, 1.0, segments + 1)
-    u, v = np.meshgrid(steps, steps[::-1])  # rows downwards, as on all grids here
+    u, v = np.meshgrid(steps[::-1], steps[::-1])  # downwards and to the left: see the grids below
     grid = np.stack([u - 0.5, v - 0.5, np.zeros_like(u)], axis=-1)
     return _mesh_of_charts([_Chart(grid, np.stack([u, v], axis=-1))])
 
@@ -179,9 +205,9 @@ def sphere(segments: int = 32) -> Mesh:
     """A sphere of radius 1 about the origin: ``segments`` (even) bands between the poles, twice
     as many around.
 
-    Two charts, one a hemisphere, in stereographic projection: conformal, the scale grows by 2
-    from pole to equator, on average (by area) a photograph is 1 x 1 unit of length large. Both
-    are laid so that their values agree along the equator: no seam can be seen.
+    Two charts, one a hemisphere: azimuthal projections about the poles, stretched by 1.34 at
+    most, at the equator. On average a photograph is 1 x 1 unit of length large. They are laid
+    so that the photograph's values agree along the equator: no seam can be seen.
 
     Raises ValueError for an odd number of segments or less than four.
     """
@@ -203,30 +229,29 @@ def teapot(segments: int = 8) -> Mesh:
     """The Utah teapot (Newell 1975; see :mod:`pipelines.teapot_patches`), each of its 32 patches
     as ``segments`` x ``segments`` pairs of triangles.
 
-    z is up, the spout points along +x; the middle of its box is the origin, the sphere about it
-    has radius 1, and there a photograph is about 1 x 1 unit large. It has
-    32 n² + 4 n + 2 positions: 2 082 for 8 segments, the vertices of the paper's teapot.
+    z is up, the spout points along +x; the middle of its box is the origin, and the sphere around
+    that has radius 1. A photograph is 1 x 1 unit of length large, on average over each chart.
 
-    Charts: the body and its rim as a cylinder in Mercator's projection, seam below the handle;
-    bottom, lid and knob as discs; handle and spout as tubes, seam on their inner and lower
-    sides. Lid, body, handle and spout are four surfaces that are not joined, open at the rims
-    and inside the body, as Newell left them.
+    Body, lid, handle and spout are four surfaces, not joined, open at the rims and inside the
+    body, as Newell left them; with n segments they have 32 n² + 4 n + 2 positions, for 8 the
+    2082 vertices of the teapot in the fur paper. Charts add copies along their borders: the body
+    is a cylinder in Mercator's projection, seam below the handle; bottom, lid and knob are
+    discs; handle and spout tubes, seam on the inner and on the lower side.
 
     Raises ValueError for less than two segments.
     """
     _check_segments(segments, 2)
-    pot = _mesh_of_charts(
-        [
-            _upright_cylinder(_swept((RIM, UPPER_BODY, LOWER_BODY), segments)),
-            _lower_disc(_swept((BOTTOM,), segments)),
-            _upper_disc(_swept((KNOB,), segments)),
-            _upper_disc(_swept((LID,), segments)),
-            _tube(_closed_ring(HANDLE, segments, first_column=0)),
-            _tube(_closed_ring(SPOUT, segments, first_column=segments)),
-        ]
-    )
-    vertices = (pot.vertices - _TEAPOT_CENTRE) / _TEAPOT_RADIUS
-    return Mesh(vertices, pot.triangles, pot.uvs / _TEAPOT_RADIUS, pot.normals)
+    side = _upright_cylinder(_swept((RIM, UPPER_BODY, LOWER_BODY), segments))
+    bottom = _lower_disc(_swept((BOTTOM,), segments))
+    knob = _upper_disc(_swept((KNOB,), segments))
+    lid = _upper_disc(_swept((LID,), segments))
+    handle = _tube(_closed_ring(HANDLE, segments, first_column=0))
+    spout = _tube(_closed_ring(SPOUT, segments, first_column=segments))
+    # Apart, as the handle's end touches the body in one of its vertices: each keeps its normal.
+    surfaces = [_mesh_of_charts(c) for c in ([side, bottom], [knob, lid], [handle], [spout])]
+    pot = _side_by_side(surfaces)
+    vertices = pot.vertices - _NEWELL_CENTRE / _NEWELL_RADIUS
+    return Mesh(vertices, pot.triangles, pot.uvs, pot.normals)
 
 
 def _check_segments(segments: int, least: int) -> None:
@@ -247,8 +272,12 @@ def _bezier(control: NDArray[np.float64], segments: int) -> NDArray[np.float64]:
     """
     t = np.linspace(0.0, 1.0, segments + 1)
     weights = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3)
-    rows = sum(w[:, None] * control[:, None, j] for j, w in enumerate(weights))
-    points: NDArray[np.float64] = sum(w[:, None, None] * rows[i] for i, w in enumerate(weights))
+    rows = np.zeros((4, segments + 1, 3))
+    points = np.zeros((segments + 1, segments + 1, 3))
+    for column, weight in enumerate(weights):
+        rows += weight[:, None] * control[:, None, column]
+    for row, weight in enumerate(weights):
+        points += weight[:, None, None] * rows[row]
     return points
 
 
@@ -257,8 +286,10 @@ def _rows_joined(patches: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _swept(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
-    """Swept patches, one below the other, all around, clockwise from -x."""
-    quarter = _rows_joined([_bezier(swept_quarter(p), segments) for p in profiles])
+    """Swept patches of the teapot, one below the other, all around, clockwise from -x."""
+    controls = [swept_quarter(profile) / _NEWELL_RADIUS for profile in profiles]
+    quarter = _rows_joined([_bezier(control, segments) for control in controls])
+    quarter[..., 2] = quarter[:, :1, 2]  # without rounding errors: a pole is one position
     x, y, z = np.moveaxis(quarter, -1, 0)
     turned = [(-x, -y), (-y, x), (x, y), (y, -x)]  # turns by quarters are exact
     sides = [np.stack([*xy, z], axis=-1) for xy in turned]
@@ -268,8 +299,8 @@ def _swept(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
 def _closed_ring(
     halves: NDArray[np.float64], segments: int, first_column: int
 ) -> NDArray[np.float64]:
-    """Patches of one half of a tube, one after the other, and their mirror image in y."""
-    half = _rows_joined([_bezier(patch, segments) for patch in halves])
+    """A tube of the teapot, from the patches of its one half and their mirror image in y."""
+    half = _rows_joined([_bezier(control / _NEWELL_RADIUS, segments) for control in halves])
     other = half[:, -2:0:-1] * [1, -1, 1]
     ring = np.roll(np.concatenate([half, other], axis=1), -first_column, axis=1)
     return np.concatenate([ring, ring[:, :1]], axis=1)
@@ -298,29 +329,83 @@ def _upper_disc(grid: NDArray[np.float64]) -> _Chart:
 
     The distance p from the middle grows by dp/ds = sqrt(p / r) along the profile s at radius r,
     half-way (geometrically) between equal distances (1) and a conformal chart (p / r), which
-    would swell where a surface falls steeply.
+    would swell where a surface falls steeply. The pole is the middle of the photograph, clear of
+    the mirrors: in a disc there is no seam to hide.
     """
     across = np.hypot(grid[..., 0], grid[..., 1])
     root = np.sqrt(across.mean(axis=1))
     distance = (root[0] + _running_sum(_steps_down(grid) / (root[1:] + root[:-1]))) ** 2
-    direction = grid[..., :2] / np.maximum(across, np.finfo(float).tiny)[..., None]
-    return _to_scale(grid, distance[:, None, None] * direction)
+    direction = grid[..., :2] / np.maximum(across, _TINY)[..., None]
+    around_pole = _to_scale(grid, distance[:, None, None] * direction)
+    return _Chart(grid, around_pole.uvs + 0.5)
 
 
 def _lower_disc(grid: NDArray[np.float64]) -> _Chart:
-    """The same for a surface that ends in its lower pole; mirrored, as it is seen from below."""
+    """The same for a surface that ends in its lower pole. As it is seen from below, u has the
+    other sign, which is the same column of the photograph."""
     uvs = _upper_disc(grid[::-1]).uvs[::-1]
     return _Chart(grid, uvs * [-1, 1])
 
 
 def _tube(grid: NDArray[np.float64]) -> _Chart:
-    """Around a tube u is the arc length from the middle column, so that the chart narrows where
-    the tube does; along it v is the rings' mean distance."""
+    """A tube cut open along its first column, even about the middle column.
+
+    Begins with the arc length around as u and the rings' mean distance along as v, which a bent
+    or tapered tube shears, and relaxes that.
+    """
     around = np.linalg.norm(np.diff(grid, axis=1), axis=-1)
     passed = np.pad(np.cumsum(around, axis=1), ((0, 0), (1, 0)))
     u = passed[:, -1:] / 2 - passed
     v = -_running_sum(_steps_down(grid))[:, None]
-    return _to_scale(grid, np.stack(np.broadcast_arrays(u, v), axis=-1))
+    plane = _relaxed(grid, u + 1j * v)
+    middle = grid.shape[1] // 2
+    axis = plane[-1, middle] - plane[0, middle]
+    upright = (plane - plane[0, middle]) * -1j * abs(axis) / axis
+    even = (upright - upright[:, ::-1].conj()) / 2
+    return _to_scale(grid, np.stack([even.real, even.imag], axis=-1))
+
+
+def _relaxed(
+    grid: NDArray[np.float64], plane: NDArray[np.complex128], rounds: int = 20
+) -> NDArray[np.complex128]:
+    """A chart (rows, columns) u + i v, made as rigid as possible: by turns, the rotation that fits
+    each triangle best, and the chart that fits all rotated triangles best (Liu et al., "A
+    local/global approach to mesh parameterization", 2008, section 4)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import factorized
+
+    start = _grid_triangles(*grid.shape[:2])
+    end = np.roll(start, -1, axis=1)
+    points = grid.reshape(-1, 3)
+    edge = points[end] - points[start]
+    length = np.linalg.norm(edge, axis=-1)
+    doubled_area = _length(np.cross(edge[:, 0], edge[:, 1]))
+    # The cotangent of the angle opposite to each edge. Obtuse angles count as right ones (and a
+    # little more, to keep the system regular): negative weights could turn triangles over.
+    cosines = -np.einsum("fei,fei->fe", np.roll(edge, -1, axis=1), np.roll(edge, -2, axis=1))
+    weight = np.maximum(cosines / doubled_area, 0.02)
+    # Each triangle's edges when it is laid flat, the first one along the real axis.
+    turn = np.arctan2(doubled_area[:, 0], np.einsum("fi,fi->f", edge[:, 0], edge[:, 1]))
+    second = length[:, 1] * np.exp(1j * turn)
+    flat = np.stack([length[:, 0] + 0j, second, -length[:, 0] - second], axis=1)
+
+    count = len(points)
+    rows, columns = (
+        np.concatenate([a.ravel() for a in pair])
+        for pair in ((start, end, start, end), (start, end, end, start))
+    )
+    values = np.concatenate([weight.ravel()] * 2 + [-weight.ravel()] * 2)
+    laplacian = coo_array((values, (rows, columns)), shape=(count, count)).tocsc()
+    solve = factorized(laplacian[1:, 1:])  # the first vertex stays at 0
+    chart = plane.ravel()
+    for _ in range(rounds):
+        fit = (weight * flat.conj() * (chart[end] - chart[start])).sum(axis=1, keepdims=True)
+        wanted = weight * flat * fit / np.abs(fit)
+        sums = np.zeros(count, complex)
+        np.add.at(sums, end, wanted)
+        np.add.at(sums, start, -wanted)
+        chart = np.concatenate([[0.0], solve(sums.real[1:]) + 1j * solve(sums.imag[1:])])
+    return chart.reshape(plane.shape)
 
 
 def _steps_down(grid: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -334,14 +419,17 @@ def _running_sum(steps: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _to_scale(grid: NDArray[np.float64], uvs: NDArray[np.float64]) -> _Chart:
-    """Scaled about 0 so that the chart has the area of the surface."""
+    """Scaled about 0 so that areas on the surface and in the chart agree, in the geometric mean
+    over the surface: a few strongly stretched triangles then do not shrink all others."""
     faces = _grid_triangles(*grid.shape[:2])
-    flat = np.pad(uvs, ((0, 0), (0, 0), (0, 1))).reshape(-1, 3)
+    flat = np.pad(uvs, ((0, 0), (0, 0), (0, 1)))
     area, chart_area = (
-        _length(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])).sum()
-        for c in (grid.reshape(-1, 3)[faces], flat[faces])
+        np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1)
+        for c in (grid.reshape(-1, 3)[faces], flat.reshape(-1, 3)[faces])
     )
-    return _Chart(grid, uvs * np.sqrt(area / chart_area))
+    there = (area > 0) & (chart_area > 0)  # not where a pole takes up a side of a triangle
+    ratios = np.log(area[there] / chart_area[there])
+    return _Chart(grid, uvs * np.exp(0.5 * np.average(ratios, weights=area[there])))
 
 
 def _grid_triangles(rows: int, columns: int) -> NDArray[np.int64]:
@@ -367,3 +455,36 @@ def _mesh_of_charts(charts: Sequence[_Chart]) -> Mesh:
         triangles.append(faces[distinct] + count)
         count += len(first)
     return make_mesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(uvs))
+
+
+def texture_stretch(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike) -> float:
+    """Median over the triangles of how far the texture is drawn out of shape; 1 = not at all.
+
+    The ratio of the singular values of each triangle's map from texture to surface, weighted by
+    the triangle's area. vertices (V, 3), triangles (F, 3), uvs (V, 2). Triangles without area on
+    the texture count as infinitely stretched.
+    """
+    corners = np.asarray(triangles)
+    points = np.asarray(vertices, dtype=np.float64)[corners]
+    texels = np.asarray(uvs, dtype=np.float64)[corners]
+    edges, steps = points[:, 1:] - points[:, :1], texels[:, 1:] - texels[:, :1]
+    area = _length(np.cross(edges[:, 0], edges[:, 1]))
+    flat = np.abs(np.linalg.det(steps)) <= 1e-14
+    steps[flat] = np.eye(2)
+    values = np.linalg.svd(np.linalg.solve(steps, edges), compute_uv=False)
+    ratio = np.where(flat, np.inf, values[:, 0] / np.maximum(values[:, 1], 1e-300))
+    order = np.argsort(ratio)
+    middle = np.searchsorted(np.cumsum(area[order]), area.sum() / 2)
+    return float(ratio[order][min(middle, len(order) - 1)])
+
+
+def _side_by_side(meshes: Sequence[Mesh]) -> Mesh:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate(
+            [mesh.triangles + np.int32(start) for mesh, start in zip(meshes, starts, strict=True)]
+        ),
+        np.concatenate([mesh.uvs for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )

@@ -224,11 +224,15 @@ class Stage:
         self._window.Render()
         for buffer in (self._window.GetRenderFramebuffer(), self._window.GetDisplayFramebuffer()):
             buffer.PopulateFramebuffer(*size, True, 1, _VTK_FLOAT, True, 32, 0, False)
+        self._has_sky = isinstance(background, np.ndarray)
         if isinstance(background, np.ndarray):
             self._renderer.AddActor(_sky(background))
+            self._renderer.SetEnvironmentUp(0.0, 0.0, 1.0)
+            self._renderer.SetEnvironmentRight(1.0, 0.0, 0.0)
         else:
             self._renderer.SetBackground(*background)
         self._renderer.SetBackgroundAlpha(0.0)
+        self.light()
 
     def __enter__(self) -> Self:
         return self

@@ -120,11 +120,14 @@ class VersionedStore:
         return pointer.version
 
     def version_under_check(self, slot: Slot, run: str) -> str:
-        """The version that a check of this run is about: the run's own, else the current one."""
-        pointer = self.pointer(slot)
-        for version in reversed(pointer.candidates):
+        """The version that a check of this run is about: the run's own, else the current one.
+
+        A run has none of its own where its content was equal to the current version's.
+        """
+        for version in reversed(self.versions(slot)):
             if self.record(slot, version).get("run") == run:
                 return version
+        pointer = self.pointer(slot)
         if pointer.version is None and pointer.candidates:
             return pointer.candidates[-1]
         return self.current(slot)

@@ -310,7 +310,7 @@ def photograph_pelt(
     ):
         if value < least:
             raise ValueError(f"{name}: expected at least {least}, found {value}")
-    fur = _Fur.of(hairs, np.asarray(skin_albedo, np.float32))
+    fur = _Fur.of(hairs, skin_albedo)
     numbers = 2 + NUMBERS_PER_VERTEX * (bounces + 1)  # the first two: a place in the pixel
     sobol = qmc.Sobol(numbers, seed=rng).random_base2(math.ceil(math.log2(samples)))
     indirect_samples = math.ceil(samples / INDIRECT_STRIDE)
@@ -344,7 +344,7 @@ class _Fur(NamedTuple):
     fibres: _Fibres
 
     @staticmethod
-    def of(hairs: Hairs, skin_albedo: np.ndarray) -> _Fur:
+    def of(hairs: Hairs, skin_albedo: tuple[float, float, float]) -> _Fur:
         points = hairs.points.astype(np.float64)
         count = points.shape[1]
         tangents = np.gradient(points, axis=1) if len(points) else points
@@ -368,12 +368,11 @@ class _Fur(NamedTuple):
             np.ascontiguousarray(hairs.points, np.float32),
             tangents.astype(np.float32),
             np.ascontiguousarray(hairs.radii, np.float32),
-            np.ascontiguousarray(hairs.albedo, np.float32),
+            np.concatenate([hairs.albedo, [skin_albedo]]).astype(np.float32),
             hair,
-            copy_shift.astype(np.float32),
+            np.ascontiguousarray(copy_shift, np.float32),
             segment,
             (template // SIDES - segment[:, None]).astype(np.float32),
-            skin_albedo,
         )
         return _Fur(scene, top, fibres)
 
@@ -388,12 +387,11 @@ class _Fibres(NamedTuple):
     points: FloatArray  # (H, P, 3)
     tangents: FloatArray  # (H, P, 3)
     radii: FloatArray  # (H, P)
-    albedo: FloatArray  # (H, 3)
+    albedo: FloatArray  # (H + 1, 3): hairs, skin
     hair: np.ndarray  # (C,) hair of each copy
     copy_shift: FloatArray  # (C, 3)
     segment: np.ndarray  # (S,) the segment between points i and i + 1
     towards_tip: FloatArray  # (S, 3) 1 for the triangle's corners at point i + 1, else 0
-    skin_albedo: np.ndarray  # (3,)
 
 
 def _rings(points: np.ndarray, radii: np.ndarray, tangents: np.ndarray) -> np.ndarray:
@@ -511,11 +509,10 @@ def _source_direction(u: float, v: float, exponent: float) -> tuple[float, float
 @njit(cache=True, error_model="numpy")
 def _along(curves: FloatArray, hair: int, s: int, f: float) -> tuple[float, float, float]:
     """Interpolate (H, P, 3) figures of a hair at the fraction f of its segment s."""
-    here, there = curves[hair, s], curves[hair, s + 1]
     return (
-        here[0] + f * (there[0] - here[0]),
-        here[1] + f * (there[1] - here[1]),
-        here[2] + f * (there[2] - here[2]),
+        (1 - f) * curves[hair, s, 0] + f * curves[hair, s + 1, 0],
+        (1 - f) * curves[hair, s, 1] + f * curves[hair, s + 1, 1],
+        (1 - f) * curves[hair, s, 2] + f * curves[hair, s + 1, 2],
     )
 
 
@@ -534,11 +531,6 @@ def _scatter(
     hair_triangles = faces * len(fibres.hair)
     source_weight = math.pi * (exponent + 2) / (exponent + 1)  # radiance over density
     for i in range(len(triangle)):
-        if triangle[i] < 0:  # under the horizon: nothing but the source, sampled already
-            out.light_origin[i] = out.next_origin[i] = origins[i]
-            out.light_direction[i] = out.next_direction[i] = directions[i]
-            out.light_weight[i] = out.next_weight[i] = 0
-            continue
         lx, ly, lz = _source_direction(random[0, i], random[1, i], exponent)
         # A point of the unit disc: lifted to the hemisphere it is cosine-distributed; its x alone
         # is the cosine to the fibre of directions with density sin t (the semicircle law), and
@@ -546,14 +538,20 @@ def _scatter(
         r = math.sqrt(random[2, i])
         a, b = r * math.cos(2 * math.pi * random[3, i]), r * math.sin(2 * math.pi * random[3, i])
         chord = math.sqrt(max(1e-6, 1 - a * a))
-        if triangle[i] >= hair_triangles:
+        if triangle[i] < 0:  # the source, whose light has been sampled before: the path ends
+            px, py, pz = 0.0, 0.0, 0.0
+            nx, ny, nz = 0.0, 0.0, 1.0
+            light, goes_on = 0.0, 0.0
+            light_start = next_start = 0.0
+            row = 0
+        elif triangle[i] >= hair_triangles:
             px = origins[i, 0] + distance[i] * directions[i, 0]
             py = origins[i, 1] + distance[i] * directions[i, 1]
             pz = 0.0
             nx, ny, nz = a, b, math.sqrt(max(0.0, 1 - a * a - b * b))
-            light = source_weight * lz / math.pi
+            light, goes_on = source_weight * lz / math.pi, 1.0
             light_start = next_start = 0.0
-            albedo = fibres.skin_albedo
+            row = len(fibres.albedo) - 1
         else:
             copy = triangle[i] // faces
             face = triangle[i] - copy * faces
@@ -567,7 +565,7 @@ def _scatter(
             scale = 1 / math.sqrt(tx * tx + ty * ty + tz * tz)
             tx, ty, tz = scale * tx, scale * ty, scale * tz
             radius = (1 - f) * fibres.radii[hair, s] + f * fibres.radii[hair, s + 1]
-            albedo = fibres.albedo[hair]
+            row = hair
             # Across the fibre: u towards the viewer, v = t x u.
             vx, vy, vz = -directions[i, 0], -directions[i, 1], -directions[i, 2]
             cosine = tx * vx + ty * vy + tz * vz
@@ -579,7 +577,7 @@ def _scatter(
             cosine = tx * lx + ty * ly + tz * lz
             sine = math.sqrt(max(1e-6, 1 - cosine * cosine))
             lobe = sine + BACKSCATTER * (ux * lx + uy * ly + uz * lz)
-            light = source_weight * lobe / math.pi**2
+            light, goes_on = source_weight * lobe / math.pi**2, 1.0
             light_start = _exit_distance(radius, sine)
             # Light from other hairs: p is uniform so far. Turning cos p round with probability
             # (1 - BACKSCATTER cos p) / 2 leaves the density 1 + BACKSCATTER cos p, and weight 1.
@@ -591,13 +589,14 @@ def _scatter(
             ny = a * ty + cu * uy + cv * vy
             nz = a * tz + cu * uz + cv * vz
             next_start = _exit_distance(radius, chord)
-        out.light_origin[i, 0] = px + light_start * lx
-        out.light_origin[i, 1] = py + light_start * ly
+        # Both go on from inside the tile, around which there are copies on all sides.
+        x, y = px + light_start * lx, py + light_start * ly
+        out.light_origin[i, 0] = x - math.floor(x)
+        out.light_origin[i, 1] = y - math.floor(y)
         out.light_origin[i, 2] = max(pz + light_start * lz, SKIN_CLEARANCE)
         out.light_direction[i, 0] = lx
         out.light_direction[i, 1] = ly
         out.light_direction[i, 2] = lz
-        # Back into the tile, around which there are copies on all sides.
         x, y = px + next_start * nx, py + next_start * ny
         out.next_origin[i, 0] = x - math.floor(x)
         out.next_origin[i, 1] = y - math.floor(y)
@@ -606,5 +605,5 @@ def _scatter(
         out.next_direction[i, 1] = ny
         out.next_direction[i, 2] = nz
         for channel in range(3):
-            out.light_weight[i, channel] = light * albedo[channel]
-            out.next_weight[i, channel] = albedo[channel]
+            out.light_weight[i, channel] = light * fibres.albedo[row, channel]
+            out.next_weight[i, channel] = goes_on * fibres.albedo[row, channel]

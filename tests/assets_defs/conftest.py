@@ -35,7 +35,9 @@ def make_house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[]
         root = tmp_path_factory.mktemp("house")
         home = root / "dagster"
         home.mkdir()
-        instance = dg.DagsterInstance.local_temp(str(home))
+        instance = dg.DagsterInstance.local_temp(
+            str(home), overrides={"telemetry": {"enabled": False}}
+        )
         opened.append(instance)
         heard: list[tuple[str, float]] = []
         workspace = Workspace(Path(root) / "data")

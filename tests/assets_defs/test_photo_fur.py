@@ -162,6 +162,7 @@ def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
     store = good.workspace.store
     before = {slot: store.pointer(slot) for slot in store.slots()}
     content = {slot: store.record(slot)["content"] for slot in before}
+    versions = {slot: set(store.versions(slot)) for slot in before}
     right = getattr(regression.home, regression.name)
     monkeypatch.setattr(
         regression.home,
@@ -173,20 +174,21 @@ def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
     failed = {
         check
         for slot in before
-        for version in store.versions(slot)
-        if version > max(p.version for p in before.values() if p.version)
+        for version in set(store.versions(slot)) - versions[slot]
         for check, verdict in store.verdicts(slot, version).items()
         if not verdict["passed"]
     }
     assert regression.check in failed
-    assert {slot: store.pointer(slot).version for slot in before} == {
-        slot: pointer.version for slot, pointer in before.items()
-    }
-    assert {slot: store.record(slot)["content"] for slot in before} == content
-    monkeypatch.undo()
-    for slot in before:
+    checked = {plan.name for plan in FUR.plans.values() for c in plan.checks if c.name in failed}
+    for slot, pointer in before.items():
         store.open(slot).load()
-    good.launcher.launch(Request(FUR, [regression.keys]))
+        if slot.asset in checked:
+            assert store.pointer(slot).version == pointer.version
+            assert store.record(slot)["content"] == content[slot]
+    monkeypatch.undo()
+    # What lies before the failed asset passed its own checks, wrong as it was: make it again.
+    force = any(store.current(slot) != pointer.version for slot, pointer in before.items())
+    good.launcher.launch(Request(FUR, [regression.keys], force=force))
 
 
 def test_a_step_inside_the_bound_is_a_regression_too(

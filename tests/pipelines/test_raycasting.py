@@ -50,11 +50,11 @@ def test_first_hits_agree_with_brute_force(soup) -> None:
     # Rays that graze an edge may go either way in float32.
     clear = (np.abs(inside) > 1e-4).all(axis=1)
     hit = np.isfinite(nearest)
-    assert clear.mean() > 0.95 and 0.3 < hit[clear].mean() < 0.9
+    assert clear.mean() > 0.95 and 0.1 < hit[clear].mean() < 0.9
 
     expected = np.where(hit, triangle, -1)
     np.testing.assert_array_equal(found.triangle[clear], expected[clear])
-    np.testing.assert_allclose(found.distance[clear], nearest[clear], rtol=1e-4)
+    np.testing.assert_allclose(found.distance[clear], nearest[clear], rtol=1e-4, atol=1e-6)
     both = clear & hit
     from_weights = np.einsum("nc,nck->nk", found.barycentric, corners[found.triangle])[both]
     from_distance = (origins + nearest[:, None] * directions)[both]
@@ -70,8 +70,8 @@ def test_occlusion_agrees_with_brute_force_up_to_the_farthest_distance(soup) -> 
     distances, inside = moeller_trumbore(*(a.astype(np.float64) for a in soup))
     nearest = distances.min(axis=1)
     for farthest in (0.25, 1.0, np.inf):
-        clear = (np.abs(inside) > 1e-4).all(axis=1) & (np.abs(nearest - farthest) > 1e-4)
-        clear |= np.isinf(nearest) & (np.abs(inside) > 1e-4).all(axis=1)
+        close_call = np.isfinite(nearest) & np.isclose(nearest, farthest, atol=1e-4)
+        clear = (np.abs(inside) > 1e-4).all(axis=1) & ~close_call
         blocked = occluded(scene, origins, directions, farthest=farthest)
         expected = np.isfinite(nearest) & (nearest <= farthest)
         np.testing.assert_array_equal(blocked[clear], expected[clear])

@@ -119,6 +119,7 @@ class Writers:
             stdout=subprocess.PIPE,
             text=True,
         )
+        assert self._answer().keys() == {"ready"}
 
     def start(self, job: str, **arguments: Any) -> Writer:
         """Start a job in a process of its own."""
@@ -129,9 +130,13 @@ class Writers:
 
     def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """The script's answer to one request."""
-        assert self._process.stdin is not None and self._process.stdout is not None
+        assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
+        return self._answer()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
         return dict(json.loads(self._process.stdout.readline()))
 
     def close(self) -> None:

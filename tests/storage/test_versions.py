@@ -571,8 +571,10 @@ class StoreMachine(RuleBasedStateMachine):
         self.verdicts: dict[tuple[str, str], bool] = {}
 
     def teardown(self) -> None:
-        """Leave nothing on disk."""
+        """Whatever happened, no published byte has changed. Leave nothing on disk."""
         if hasattr(self, "store"):
+            for version in self.there:
+                assert _hashes(self.store.folder(SLOT, version)) == self.known[version].files
             shutil.rmtree(self.store.root)
 
     @property
@@ -595,7 +597,7 @@ class StoreMachine(RuleBasedStateMachine):
         self.waiting -= gone
         return gone
 
-    @rule(value=st.integers(0, 2), size=st.integers(0, 1), count=st.integers(0, 2))
+    @rule(value=st.integers(0, 4), size=st.integers(0, 1), count=st.integers(0, 2))
     def write(self, value: int, size: int, count: int) -> None:
         """Write, with none, one or two checks to wait for."""
         checks = CHECKS[:count]
@@ -615,11 +617,8 @@ class StoreMachine(RuleBasedStateMachine):
             self.promote_if_passed(version)
         self.forget_old()
 
-    @precondition(lambda self: self.there)
-    @rule(data=st.data(), check=st.sampled_from(CHECKS), passed=st.booleans())
-    def judge(self, data: st.DataObject, check: str, passed: bool) -> None:
-        """Any check says anything of any version."""
-        version = data.draw(st.sampled_from(sorted(self.there)))
+    def judge(self, version: str, check: str, passed: bool) -> None:
+        """One check's verdict, in store and model."""
         self.verdicts[version, check] = passed
         if passed:
             self.store.pass_version(SLOT, version, check, 0.5)
@@ -629,6 +628,27 @@ class StoreMachine(RuleBasedStateMachine):
             self.waiting.discard(version)
             assert self.store.reject(SLOT, version, check, "bad") == self.current
 
+    @precondition(lambda self: self.there)
+    @rule(data=st.data(), check=st.sampled_from(CHECKS), passed=st.booleans())
+    def judge_any(self, data: st.DataObject, check: str, passed: bool) -> None:
+        """Any check says anything of any version, awaited or not."""
+        self.judge(data.draw(st.sampled_from(sorted(self.there))), check, passed)
+
+    @precondition(lambda self: self.waiting)
+    @rule(newest=st.booleans())
+    def pass_all(self, newest: bool) -> None:
+        """A version that waits passes all its checks."""
+        version = max(self.waiting) if newest else min(self.waiting)
+        for check in self.known[version].checks:
+            self.judge(version, check, True)
+
+    @precondition(lambda self: self.good)
+    @rule(current=st.booleans())
+    def reject_good(self, current: bool) -> None:
+        """A check fails after all: of the current version, or of the oldest good one."""
+        self.judge(max(self.good) if current else min(self.good), "sharp", False)
+
+    @precondition(lambda self: self.there)
     @rule()
     def roll_back(self) -> None:
         """Back to the good version before, where there is one."""
@@ -648,6 +668,7 @@ class StoreMachine(RuleBasedStateMachine):
             _make_older(self.store.folder(SLOT, version), DAY + 1)
         self.old |= ageing
 
+    @precondition(lambda self: self.old)
     @rule()
     def collect(self) -> None:
         """Collect what nobody needs."""
@@ -655,7 +676,7 @@ class StoreMachine(RuleBasedStateMachine):
 
     @invariant()
     def the_store_is_as_the_model_says(self) -> None:
-        """Pointer, folders, verdicts, and the bytes of everything that was ever published."""
+        """Pointer, folders, verdicts, and the current value."""
         if not hasattr(self, "store"):
             return
         pointer = self.store.pointer(SLOT)
@@ -665,8 +686,6 @@ class StoreMachine(RuleBasedStateMachine):
         assert list(pointer.candidates) == sorted(self.waiting)
         assert self.store.versions(SLOT) == sorted(self.there)
         for version in self.there:
-            folder = self.store.folder(SLOT, version)
-            assert _hashes(folder) == self.known[version].files
             expected = {c: p for (v, c), p in self.verdicts.items() if v == version}
             verdicts = self.store.verdicts(SLOT, version)
             assert {check: verdict["passed"] for check, verdict in verdicts.items()} == expected
@@ -678,8 +697,8 @@ class StoreMachine(RuleBasedStateMachine):
 
 
 StoreMachine.TestCase.settings = settings(
-    max_examples=25,
-    stateful_step_count=20,
+    max_examples=15,
+    stateful_step_count=40,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )

@@ -4,7 +4,7 @@ A script for the fixture ``writers`` in ``conftest.py``. Importing xarray, zarr 
 seconds, a fork milliseconds: the script imports once, then forks one child a job. It stays
 single-threaded (it never touches a store itself), which is what makes forking safe.
 
-It reads one JSON object a line from stdin and answers each with one on stdout:
+It says ``{"ready": …}``, then reads one JSON object a line from stdin and answers each on stdout:
 
     {"start": JOB, "report": FILE, "arguments": {...}}    -> {"pid": 123}
     {"wait": 123, "block": true}                          -> {"status": 0} or -9, or null: runs on
@@ -168,9 +168,7 @@ def _die_in(target: str, holding: str, call: int, when: str) -> None:
     @functools.wraps(function)
     def wrapped(*arguments: Any, **keywords: Any) -> Any:
         nonlocal calls
-        # An open file is told by its name.
-        if any(holding in str(getattr(argument, "name", argument)) for argument in arguments):
-            calls += 1
+        calls += any(holding in str(argument) for argument in arguments)
         if calls < call:
             return function(*arguments, **keywords)
         if when == "half":
@@ -201,6 +199,7 @@ def _run(job: str, report_file: str, arguments: dict[str, Any]) -> int:
 
 
 def _serve() -> None:
+    print(json.dumps({"ready": os.getpid()}), flush=True)
     running: set[int] = set()
     for line in iter(sys.stdin.readline, ""):
         request = json.loads(line)
