@@ -94,9 +94,13 @@ def _tree(name: str) -> ast.Module:
 
 
 def _dump(tree: ast.Module) -> str:
+    # All bare constants go, not the first one: fields have docstrings too, and a tree that is kept
+    # must give the same text when it is dumped again.
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            first = node.body[0] if node.body else None
-            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-                node.body = node.body[1:]
+            node.body = [line for line in node.body if not _is_bare_constant(line)]
     return ast.dump(tree)
+
+
+def _is_bare_constant(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)

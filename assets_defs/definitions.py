@@ -37,8 +37,8 @@ def build_definitions(
     jobs = [_grain_job(system, by) for system in systems for by in system.grains()]
     # The sensor's own owners are a beta of Dagster's that nothing here uses.
     warnings.filterwarnings("ignore", category=dg.BetaWarning)
-    launch = launch_job(SYSTEMS)
-    return dg.Definitions(
+    launch = launch_job(SYSTEMS, lambda name: definitions.get_repository_def().get_job(name))
+    definitions = dg.Definitions(
         assets=[asset for system in systems for asset in system.assets],
         asset_checks=[check for system in systems for check in system.asset_checks],
         jobs=[*jobs, launch],
@@ -47,6 +47,7 @@ def build_definitions(
         resources=provided,
         executor=dg.in_process_executor,
     )
+    return definitions
 
 
 def _grain_job(system: System, by: tuple[str, ...]) -> Any:

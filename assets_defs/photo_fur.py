@@ -65,13 +65,13 @@ class PhotoSettings(Settings):
         1024, ge=64, le=8192, description="Longer side in pixels; larger photographs are averaged"
     )
     pelt_size: int = Field(512, ge=64, le=2048, description="Virtual pelt: pixels a side")
-    pelt_hairs: int = Field(9000, ge=100, le=100_000, description="Virtual pelt: hairs")
-    pelt_samples: int = Field(16, ge=1, le=4096, description="Virtual pelt: light paths a pixel")
+    pelt_hairs: int = Field(16_000, ge=100, le=100_000, description="Virtual pelt: hairs")
+    pelt_samples: int = Field(24, ge=1, le=4096, description="Virtual pelt: light paths a pixel")
     pelt_seed: int = Field(0, ge=0, description="Virtual pelt: seed")
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"largest_side": 128, "pelt_size": 64, "pelt_hairs": 400, "pelt_samples": 4},
-        "paper": {"largest_side": 4096, "pelt_samples": 128},
+        "test": {"largest_side": 128, "pelt_size": 64, "pelt_hairs": 280, "pelt_samples": 16},
+        "paper": {"largest_side": 4096, "pelt_samples": 64},
     }
 
 
@@ -485,8 +485,11 @@ def shell_mesh(settings: MeshSettings, source: Source) -> Result:
 class FrameSettings(Settings):
     """How the pictures are taken."""
 
-    size: int = Field(
-        512, ge=32, le=4096, description="Pixels a side; the square's pictures are the photograph's"
+    width: int = Field(
+        640,
+        ge=32,
+        le=4096,
+        description="Pixels across, 4:3; the square's pictures have the photograph's size",
     )
     supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
     tails: Tails = "end layers"
@@ -495,8 +498,8 @@ class FrameSettings(Settings):
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"size": 96, "supersampling": 1},
-        "paper": {"size": 1024, "supersampling": 3},
+        "test": {"width": 96, "supersampling": 1},
+        "paper": {"width": 1280, "supersampling": 3},
     }
 
 
@@ -576,7 +579,7 @@ def fur_frames(
 
     radiance = fur_photo["radiance"].values
     shells = shell_mesh["vertices"].values
-    views, size = ROUND_VIEWS, (settings.size, settings.size)
+    views, size = ROUND_VIEWS, (settings.width * 3 // 4, settings.width)
     if keys["mesh"] == SQUARE:
         views, size = SQUARE_VIEWS, radiance.shape[:2]
         shells = square_of_photograph(shells, size)

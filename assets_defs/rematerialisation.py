@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import dagster as dg
 from pydantic import Field
 
-from assets_defs.launcher import Launcher, Request
+from assets_defs.launcher import JobByName, Launcher, Request
 from assets_defs.system import System
 
 
@@ -23,14 +23,13 @@ class LaunchConfig(dg.Config):
     force: bool = Field(False, description="Also run what is current")
 
 
-def launch_job(systems: Mapping[str, System]) -> dg.JobDefinition:
-    """The job `launch`: one op that runs graphs grain by grain."""
+def launch_job(systems: Mapping[str, System], job: JobByName) -> dg.JobDefinition:
+    """The job `launch`: one op that runs graphs grain by grain, by the jobs that ``job`` finds."""
 
     @dg.op(required_resource_keys={"workspace", "progress"})
     def launch_graph(context: dg.OpExecutionContext, config: LaunchConfig) -> None:
         workspace, progress = context.resources.workspace, context.resources.progress
-        definitions = context.repository_def
-        launcher = Launcher(context.instance, workspace, definitions.get_job, progress)
+        launcher = Launcher(context.instance, workspace, job, progress)
         chosen = [systems[config.system]] if config.system else list(systems.values())
         for system in chosen:
             partitions = config.partitions or system.made(workspace.store)

@@ -44,7 +44,7 @@ LAYERS = 15
 TAIL = 0.005
 WINDOW = (640, 480)
 FRAMES = 21
-PELT = {"size": 512, "hairs": 9000, "samples": 16}
+PELT = {"size": 512, "hairs": 16_000, "samples": 24}
 SEEDS = (0, 1, 2)
 
 

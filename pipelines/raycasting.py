@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
+    from open3d.core import Tensor
     from open3d.t.geometry import RaycastingScene
 
 # Rays handed to Embree at once: 6 MB of rays, enough to keep all threads busy.
@@ -135,7 +136,7 @@ def _broadcast_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[np.ndarr
     return np.broadcast_to(starts, shape), np.broadcast_to(ways, shape)
 
 
-def _ray_tensor(origins: np.ndarray, directions: np.ndarray):  # noqa: ANN202 (Open3D tensor)
+def _ray_tensor(origins: np.ndarray, directions: np.ndarray) -> Tensor:
     import open3d as o3d
 
     rays = np.empty((len(origins), 6), np.float32)

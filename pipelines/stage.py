@@ -89,6 +89,33 @@ def orbit(
     )
 
 
+def fitting_distance(
+    points: NDArray[np.floating],
+    target: Vector,
+    azimuth: float,
+    elevation: float,
+    *,
+    view_angle: float,
+    aspect: float,
+) -> float:
+    """Distance from which an orbiting camera has all points (n, 3) just inside its picture.
+
+    ``aspect`` is width / height; angles in degrees as in ``orbit``.
+    """
+    around, above = math.radians(azimuth), math.radians(elevation)
+    right = np.array([-math.sin(around), math.cos(around), 0.0])
+    back = np.array(
+        [math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)]
+    )
+    up = np.cross(back, right)
+    offsets = np.asarray(points, dtype=np.float64) - np.asarray(target)
+    slope = math.tan(math.radians(view_angle / 2))
+    needed = offsets @ back + np.maximum(
+        np.abs(offsets @ up) / slope, np.abs(offsets @ right) / (slope * aspect)
+    )
+    return float(needed.max())
+
+
 # ---- textures and surfaces -------------------------------------------------------------------
 
 
@@ -201,7 +228,8 @@ class Stage:
     """An offscreen picture of width x height pixels; use it as a context manager.
 
     ``background`` is a linear colour, or an environment: linear radiance (height, width, 3) in
-    equirectangular layout, z up, the left edge at azimuth -180 degrees. Raises NoGraphicsError.
+    equirectangular layout, z up, as seen from inside (not mirrored): azimuth 0 is in the middle,
+    azimuth 90 a quarter of the width from the left edge. Raises NoGraphicsError.
     """
 
     def __init__(
@@ -227,6 +255,7 @@ class Stage:
         self._has_sky = isinstance(background, np.ndarray)
         if isinstance(background, np.ndarray):
             self._renderer.AddActor(_sky(background))
+            # VTK's sky has y up, whatever its floor plane says.
             self._renderer.SetEnvironmentUp(0.0, 0.0, 1.0)
             self._renderer.SetEnvironmentRight(1.0, 0.0, 0.0)
         else:
@@ -256,11 +285,12 @@ class Stage:
             self._renderer.RemoveActor(actor)
 
     def light(self, *lights: Light) -> None:
-        """Light the stage by these lights and no others."""
+        """Light the stage by these lights and no others; at first there are none."""
         from vtkmodules.vtkRenderingCore import vtkLight
 
         self._renderer.RemoveAllLights()
-        for light in lights:
+        # With no light at all VTK does not shade: lit surfaces would show their albedo.
+        for light in lights or (Light(colour=(0.0, 0.0, 0.0)),):
             made = vtkLight()
             made.SetColor(*light.colour)
             made.PositionalOff()
@@ -282,15 +312,15 @@ class Stage:
         if camera.height is not None:
             view.SetParallelScale(camera.height / 2)
         view.SetViewAngle(camera.view_angle)
-        self._renderer.ResetCameraClippingRange()
 
     def draw(self) -> None:
         """Draw and wait until it is done, without reading the picture back."""
+        self._renderer.ResetCameraClippingRange()
         self._window.Render()
         self._window.WaitForCompletion()
 
     def radiance(self) -> NDArray[np.float32]:
-        """Draw; linear radiance and coverage, (height, width, 4), row 0 at the top."""
+        """Draw; linear radiance and coverage by surfaces, (height, width, 4), row 0 at the top."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray
 
@@ -299,6 +329,10 @@ class Stage:
         pixels = vtkFloatArray()
         self._window.GetRGBAPixelData(0, 0, columns - 1, rows - 1, 0, pixels, 0)
         picture = vtk_to_numpy(pixels).reshape(rows, columns, 4)[::-1]
+        if self._has_sky:  # which is drawn as opaque as a surface, but at infinity
+            depths = vtkFloatArray()
+            self._window.GetZbufferData(0, 0, columns - 1, rows - 1, depths)
+            picture[..., 3] = vtk_to_numpy(depths).reshape(rows, columns)[::-1] < 1.0
         n = self.supersampling
         return picture.reshape(self.height, n, self.width, n, 4).mean(axis=(1, 3))
 
@@ -320,10 +354,9 @@ def _sky(environment: NDArray[np.float32]) -> Any:
     from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLSkybox
 
     sky = vtkOpenGLSkybox()
-    sky.SetTexture(texture(np.ascontiguousarray(environment, dtype=np.float32), wrap="repeat"))
+    # Repeated, the zenith would take half of its light from the nadir.
+    sky.SetTexture(texture(np.ascontiguousarray(environment, dtype=np.float32), wrap="clamp"))
     sky.SetProjectionToSphere()
-    sky.SetFloorPlane(0.0, 0.0, 1.0, 0.0)
-    sky.SetFloorRight(1.0, 0.0, 0.0)
     sky.GammaCorrectOff()
     return sky
 

@@ -12,6 +12,7 @@ import json
 import math
 import os
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,12 +52,13 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
             "_FillValue": None,
         }
     folder.mkdir(parents=True)
+    store = _stoppable_store()(LocalStore(folder))
     try:
-        prepared.to_zarr(
-            LocalStore(folder), mode="w-", encoding=encoding, zarr_format=3, consolidated=False
-        )
+        prepared.to_zarr(store, mode="w-", encoding=encoding, zarr_format=3, consolidated=False)
     except OSError as error:
         raise disk_error(error, folder) from error
+    finally:
+        store.stop()
 
 
 def add_to_record(folder: Path, **entries: Any) -> None:
@@ -84,13 +86,14 @@ def open_dataset(folder: Path) -> xr.Dataset:
     import xarray as xr
     from zarr.storage import LocalStore
 
-    return xr.open_zarr(
+    opened: xr.Dataset = xr.open_zarr(
         _strict_store()(LocalStore(folder, read_only=True)),
         chunks={},
         consolidated=False,
         zarr_format=3,
         mask_and_scale=False,
     )
+    return opened
 
 
 def verify_complete(folder: Path) -> None:
@@ -99,9 +102,9 @@ def verify_complete(folder: Path) -> None:
         shape = metadata["shape"]
         chunks = metadata["chunk_grid"]["configuration"]["chunk_shape"]
         expected = math.prod(math.ceil(n / c) for n, c in zip(shape, chunks, strict=True))
-        found = sum(1 for _ in _files(array_folder / "c")) if shape else int(
-            (array_folder / "c").is_file()
-        )
+        # A scalar's one chunk is the file c itself.
+        stored = _files(array_folder / "c") if shape else array_folder.glob("c")
+        found = sum(1 for _ in stored)
         if found != expected:
             raise MissingChunkError(
                 f"{array_folder}: {found} chunks are stored; expected {expected}."
@@ -195,11 +198,44 @@ def _lazy_chunks(variable: Any, planned: tuple[int, ...]) -> tuple[int, ...]:
     return own if large_enough else planned
 
 
+def _stoppable_store() -> Any:
+    """The wrapper class (made on demand: importing zarr takes a second)."""
+    from zarr.storage import WrapperStore
+
+    class StoppableStore(WrapperStore[Any]):
+        """Writes nothing once it is stopped.
+
+        When one chunk fails, zarr and dask raise at once and go on with other chunks behind the
+        scenes: they would make the folder anew while the caller deletes it.
+        """
+
+        stopped = False
+        at_work = 0
+
+        async def set(self, key: str, value: Any) -> None:
+            # Counted before `stopped` is looked at, so that `stop` cannot miss it.
+            self.at_work += 1
+            try:
+                if self.stopped:
+                    raise StoreError(f"{self._store}: chunk {key} comes after the writing ended.")
+                await self._store.set(key, value)
+            finally:
+                self.at_work -= 1
+
+        def stop(self) -> None:
+            """Refuse what comes, wait for what is under way."""
+            self.stopped = True
+            while self.at_work:
+                time.sleep(0.001)
+
+    return StoppableStore
+
+
 def _strict_store() -> Any:
     """The wrapper class (made on demand: importing zarr takes a second)."""
     from zarr.storage import WrapperStore
 
-    class StrictStore(WrapperStore):  # type: ignore[type-arg]
+    class StrictStore(WrapperStore[Any]):
         """Raises MissingChunkError where zarr would return the fill value."""
 
         async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:

@@ -25,7 +25,14 @@ from assets_defs.workspace import CHECKOUT, Workspace
 from storage.errors import StoreError
 from tsuya.doctor import examine
 from tsuya.gallery import write_gallery
-from tsuya.report import figures_table, outcome_reports, parse_key, slot_report, status_table
+from tsuya.report import (
+    figures_table,
+    outcome_reports,
+    parse_key,
+    sizes_table,
+    slot_report,
+    status_table,
+)
 from tsuya.session import Session, SetUpError, open_session
 
 PICTURES = CHECKOUT / "pictures"
@@ -226,6 +233,6 @@ def _report(
     if as_json:
         click.echo(json.dumps({"seconds": round(seconds, 3), "assets": reports}))
         return
-    Console().print(figures_table(reports))
+    Console().print(sizes_table(reports), figures_table(reports))
     made = sum(1 for outcome in outcomes if outcome.state == "made")
     click.echo(f"{made} made, {len(outcomes) - made} current already, {seconds:.1f} s.")

@@ -53,23 +53,54 @@ def outcome_reports(store: VersionedStore, outcomes: Sequence[Outcome]) -> list[
 
 
 def figures_table(reports: Sequence[dict[str, Any]]) -> Table:
-    """One row an asset's partition: what became of it, its size and its figures."""
-    table = Table(title="Figures", title_justify="left")
-    for name, justify in (("asset", "left"), ("", "left"), ("s", "right"), ("kB", "right")):
-        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
-    table.add_column("figures of the checks")
-    for report in reports:
-        figures = ", ".join(
-            f"{name} {value:.4g}" for name, value in report.get("figures", {}).items()
-        )
-        table.add_row(
-            report["key"].partition("/")[2],
-            report["state"],
-            f"{report['seconds']:.2f}",
-            f"{report.get('bytes', 0) / 1000:.0f}",
-            figures,
-        )
+    """One row a check: on how many partitions, between which figures, within which bounds."""
+    table = Table(title="Figures of the checks", title_justify="left")
+    for name, justify in (
+        ("asset", "left"), ("check", "left"), ("on", "right"), ("least", "right"),
+        ("most", "right"), ("bounds", "left"),
+    ):  # fmt: skip
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for system in SYSTEMS.values():
+        for plan in system.plans.values():
+            found = [report for report in reports if _is_of(report, system.name, plan.name)]
+            for check in plan.checks:
+                figures = [
+                    report["figures"][check.name]
+                    for report in found
+                    if check.name in report.get("figures", {})
+                ]
+                if figures:
+                    low, high = f"{min(figures):.4g}", f"{max(figures):.4g}"
+                    row = (plan.name, check.name, str(len(figures)), low, high, check.bounds())
+                    table.add_row(*row)
     return table
+
+
+def sizes_table(reports: Sequence[dict[str, Any]]) -> Table:
+    """One row an asset: how many partitions were made, seconds, bytes."""
+    table = Table(title="Assets", title_justify="left")
+    for name, justify in (
+        ("asset", "left"), ("made", "right"), ("current", "right"), ("s", "right"),
+        ("kB stored", "right"),
+    ):  # fmt: skip
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for system in SYSTEMS.values():
+        for plan in system.plans.values():
+            found = [report for report in reports if _is_of(report, system.name, plan.name)]
+            if found:
+                made = sum(report["state"] == "made" for report in found)
+                table.add_row(
+                    plan.name,
+                    str(made),
+                    str(len(found) - made),
+                    f"{sum(report['seconds'] for report in found):.1f}",
+                    f"{sum(report.get('bytes', 0) for report in found) / 1000:.0f}",
+                )
+    return table
+
+
+def _is_of(report: dict[str, Any], system: str, asset: str) -> bool:
+    return bool(report["key"].startswith(f"{system}/{asset}/"))
 
 
 def status_table(reports: Sequence[dict[str, Any]]) -> Table:

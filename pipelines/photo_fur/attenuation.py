@@ -47,7 +47,9 @@ class Attenuation(NamedTuple):
         """I(n), n = 0 … layers: luminances between the layers (Eq. 4). Raises ValueError."""
         require_layers(layers)
         steps = np.arange(layers + 1) / layers
-        return np.asarray(self.brightest * (self.darkest / self.brightest) ** steps)
+        luminances = np.asarray(self.brightest * (self.darkest / self.brightest) ** steps)
+        luminances[-1] = self.darkest  # not an ulp beside it: Imin itself is a pixel's luminance
+        return luminances
 
 
 class Histogram(NamedTuple):

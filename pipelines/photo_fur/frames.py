@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pipelines.colour import to_8bit
 from pipelines.photo_fur.attenuation import Attenuation, Tails
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
-from pipelines.stage import Camera, Light, Stage, orbit
+from pipelines.stage import Camera, Light, Stage, fitting_distance, orbit
 
 BACKGROUND = (0.32, 0.34, 0.37)
 _VIEW_ANGLE = 30.0
-_MARGIN = 1.06
+_MARGIN = 1.03
 
 
 class View(NamedTuple):
@@ -64,15 +64,12 @@ def draw_frames(
     The light comes along the view, as it did in the photograph (Lambert).
     """
     image = fur_texture(radiance, luminance, attenuation, len(shells), tails=tails)
-    # The skin frames the picture: the layers stand out by their thickness, within the margin.
-    corners = shells.reshape(-1, 3)
-    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    radius = float(np.linalg.norm(corners - centre, axis=1).max())
+    height, width = size
+    cameras = _cameras(views, shells.reshape(-1, 3), width / height)
     pictures, coverage = [], []
-    for done, view in enumerate(views):
+    for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
         progress(done / len(views))
         scale = 1 if view.photograph else supersampling
-        height, width = size
         with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
             stage.add(
                 fur_surface(
@@ -89,7 +86,7 @@ def draw_frames(
                 )
             )
             stage.light(Light())
-            stage.look(_camera(view, centre, radius, corners))
+            stage.look(camera)
             picture = stage.radiance()
         pictures.append(to_8bit(picture[..., :3]))
         coverage.append(float(np.mean(picture[..., 3] > 0)))
@@ -108,12 +105,19 @@ def square_of_photograph(vertices: NDArray[Any], shape: tuple[int, int]) -> NDAr
     return (vertices * np.array([width / height, 1.0, 1.0])).astype(np.float32)
 
 
-def _camera(
-    view: View, centre: NDArray[Any], radius: float, corners: NDArray[np.float32]
-) -> Camera:
-    target = (float(centre[0]), float(centre[1]), float(centre[2]))
-    if view.photograph:
-        height = float(np.ptp(corners[:, 1]))
-        return orbit(target, 4 * radius, view.azimuth, view.elevation, height=height)
-    distance = _MARGIN * radius / np.sin(np.radians(_VIEW_ANGLE / 2))
-    return orbit(target, distance, view.azimuth, view.elevation, view_angle=_VIEW_ANGLE)
+def _cameras(
+    views: Sequence[View], points: NDArray[np.float32], aspect: float
+) -> list[Camera]:
+    """One camera a view; all that are perspective stand equally far away."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    x, y, z = ((low + high) / 2).tolist()
+    lens = {"view_angle": _VIEW_ANGLE}
+    distance = _MARGIN * max(
+        fitting_distance(points, (x, y, z), *view[:2], aspect=aspect, **lens) for view in views
+    )
+    return [
+        orbit((x, y, z), distance, *view[:2], height=float(high[1] - low[1]))
+        if view.photograph
+        else orbit((x, y, z), distance, *view[:2], **lens)
+        for view in views
+    ]

@@ -16,7 +16,8 @@ def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
     """
     if radiance.max() <= 1.0:
         return radiance.astype(np.float32)
-    white = np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE)
+    # A few lights in the dark: all but them is black, and then the brightest is white.
+    white = np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE) or radiance.max()
     return np.clip(radiance / white, 0.0, 1.0).astype(np.float32)
 
 

@@ -38,8 +38,20 @@ Scattering
 
 Camera
     Orthographic, box-filtered pixels, then a lens blur of LENS_BLUR pixels. Samples are Sobol
-    points shifted at random for each pixel. Indirect light is the smaller and smoother part: only
-    every INDIRECT_STRIDE-th sample follows it (least noise for a given number of rays).
+    points shifted at random for each pixel. Indirect light is the smaller and smoother part (a
+    fifth of the light, a tenth of the variance): one in INDIRECT_STRIDE samples follows it, which
+    gives about the least noise for a number of rays.
+
+Limits
+    Hairs have no gloss and no medulla, and their roots no darker colour. A ray sees the tile's
+    copies as far away as the fur is high; beyond, it meets bare skin or the sky.
+
+What comes out (512 pixels, 16 000 hairs, 24 samples, three seeds)
+    Brightness falls with depth with a rank correlation of 0.73 to 0.75. Its mean at a depth is
+    level over the top third, where only the highest tufts reach and nothing shades them; from
+    there it falls by two thirds on a curve nearer to a bent S than to one exponential (log-linear
+    fit: a = 2 a thickness, R^2 0.96 of the means), and ends on the floor of multiply scattered
+    light.
 
 All random numbers come from one Generator; sums are in a fixed order and no ray's answer
 depends on threads. Equal arguments give equal bits on one machine.
@@ -85,7 +97,6 @@ SIDES = 3  # of a hair's prism
 PIXELS_PER_BLOCK = 1 << 17
 NUMBERS_PER_VERTEX = 5  # random: direction to the light (2), next direction (3)
 SKIN_CLEARANCE = 1e-5  # rays start at least this far above the skin: no skin shadows itself
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec. 709 weights
 
 
 class Hairs(NamedTuple):
@@ -242,9 +253,7 @@ def _curves(
     return points
 
 
-def _lie_of_the_fur(
-    length: float, rng: np.random.Generator
-) -> Callable[[np.ndarray], np.ndarray]:
+def _lie_of_the_fur(length: float, rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
     """Make a smooth periodic field of headings: a function of positions (N, 2)."""
     frequencies = np.array([(1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (-1, 2)])
     amplitudes = 0.45 * rng.normal(0, 1, len(frequencies)) / np.linalg.norm(frequencies, axis=1)
@@ -254,7 +263,8 @@ def _lie_of_the_fur(
     mean = rng.uniform(0, 2 * math.pi)
 
     def heading(position: np.ndarray) -> np.ndarray:
-        return mean + np.cos(2 * math.pi * position @ frequencies.T + phases) @ amplitudes
+        turns: np.ndarray = np.cos(2 * math.pi * position @ frequencies.T + phases) @ amplitudes
+        return mean + turns
 
     return heading
 
@@ -273,7 +283,8 @@ def _draw_together(
     strength = np.clip(cohesion * rng.uniform(0.4, 1.25, len(points)), 0, 0.95)
     along = np.linspace(0, 1, points.shape[1])
     pull = strength[:, None, None] * along[:, None] ** onset * np.array([1, 1, 0.5])
-    return points + pull * (guides - points)
+    drawn: np.ndarray = points + pull * (guides - points)
+    return drawn
 
 
 # --------------------------------------------------------------------------------------------
@@ -314,6 +325,7 @@ def photograph_pelt(
     numbers = 2 + NUMBERS_PER_VERTEX * (bounces + 1)  # the first two: a place in the pixel
     sobol = qmc.Sobol(numbers, seed=rng).random_base2(math.ceil(math.log2(samples)))
     indirect_samples = math.ceil(samples / INDIRECT_STRIDE)
+    indirect_weight = samples / indirect_samples
     vertices = [bounces + 1 if k < indirect_samples else 1 for k in range(samples)]
 
     radiance = np.zeros((size * size, 3), np.float32)
@@ -326,7 +338,7 @@ def photograph_pelt(
             random = (shift + sobol[k, :, None].astype(np.float32)) % np.float32(1)
             origins = _camera_origins(pixels, size, random[:2], fur.top)
             radiance[pixels] += _path_radiance(
-                fur, origins, random[2:], vertices[k], samples / indirect_samples, source_exponent
+                fur, origins, random[2:], vertices[k], indirect_weight, float(source_exponent)
             )
             if progress is not None:
                 done = first * sum(vertices) + len(pixels) * sum(vertices[: k + 1])
@@ -351,8 +363,8 @@ class _Fur(NamedTuple):
         tangents /= np.maximum(np.linalg.norm(tangents, axis=-1, keepdims=True), 1e-12)
         rings = _rings(points, hairs.radii, tangents)
         top = float(rings[..., 2].max(initial=0.0))
-        # A path that leaves one hair has come home to the tile first: the margin needs to be as
-        # wide as slant rays stay in the fur, not as a whole path wanders.
+        # Every ray starts inside the tile, so the copies need to reach as far as a single ray flies
+        # through the fur. Margins of 2 and 4 times the height change the mean by 0.02 % (seen).
         hair, copy_shift = _copies_in_reach(points, margin=top)
         template = _prism_triangles(count)
         prisms = np.arange(len(hair))[:, None, None] * (count * SIDES) + template
@@ -402,7 +414,8 @@ def _rings(points: np.ndarray, radii: np.ndarray, tangents: np.ndarray) -> np.nd
     ridge = np.cross(side, tangents)
     angle = math.pi / 2 + 2 * math.pi * np.arange(SIDES)[:, None] / SIDES
     spokes = side[:, :, None] * np.cos(angle) + ridge[:, :, None] * np.sin(angle)
-    return points[:, :, None] + radii[:, :, None, None] * spokes
+    rings: np.ndarray = points[:, :, None] + radii[:, :, None, None] * spokes
+    return rings
 
 
 def _prism_triangles(points: int) -> np.ndarray:
@@ -422,10 +435,11 @@ def _copies_in_reach(points: np.ndarray, margin: float) -> tuple[np.ndarray, np.
     hair, shift = [], []
     for i in range(first[0], last[0] + 1):
         for j in range(first[1], last[1] + 1):
-            near = (high + (i, j) >= -margin) & (low + (i, j) <= 1 + margin)
+            tile = np.array([i, j, 0.0])
+            near = (high + tile[:2] >= -margin) & (low + tile[:2] <= 1 + margin)
             found = np.flatnonzero(near.all(axis=1))
             hair.append(found)
-            shift.append(np.broadcast_to((float(i), float(j), 0.0), (len(found), 3)))
+            shift.append(np.broadcast_to(tile, (len(found), 3)))
     return np.concatenate(hair), np.concatenate(shift)
 
 
@@ -447,9 +461,9 @@ def _camera_height(top: float) -> float:
 def _depth(fur: _Fur, pixels: np.ndarray, size: int) -> np.ndarray:
     origins = _camera_origins(pixels, size, (0.5, 0.5), fur.top)
     distance = first_hits(fur.scene, origins, (0.0, 0.0, -1.0)).distance
-    height = _camera_height(fur.top) - distance.astype(np.float64)
+    height: np.ndarray = _camera_height(fur.top) - distance.astype(np.float64)
     height[distance >= origins[:, 2]] = 0  # the skin exactly, whatever the rounding
-    return np.clip(1 - height / max(fur.top, 1e-12), 0, 1)
+    return (1 - height / max(fur.top, 1e-12)).clip(0, 1)
 
 
 def _path_radiance(
@@ -524,8 +538,16 @@ def _exit_distance(radius: float, sine: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _scatter(
-    distance, triangle, barycentric, origins, directions, random, exponent, fibres, out
-):  # noqa: ANN001, ANN202 (numba infers)
+    distance: FloatArray,
+    triangle: NDArray[np.int64],
+    barycentric: FloatArray,
+    origins: FloatArray,
+    directions: FloatArray,
+    random: FloatArray,
+    exponent: float,
+    fibres: _Fibres,
+    out: _Scattered,
+) -> None:
     """Fill ``out`` for each ray's first hit; random numbers (NUMBERS_PER_VERTEX, N)."""
     faces = len(fibres.segment)
     hair_triangles = faces * len(fibres.hair)

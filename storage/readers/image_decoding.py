@@ -194,14 +194,15 @@ def _decode_tiff(file: Path) -> DecodedImage:
     try:
         with tifffile.TiffFile(file) as tiff:
             page = tiff.pages.first
-            width, height = page.imagewidth, page.imagelength
+            width, height = int(page.imagewidth), int(page.imagelength)
             ends = [a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=True)]
-            complete = len(page.tags) == _tag_count(tiff, page)
+            complete = max(ends) <= file.stat().st_size
+            complete &= len(page.tags) == _tag_count(tiff, page)
     except Exception as error:  # decoders of damaged data raise nearly anything
         raise _damaged(file, "TIFF") from error
-    _check_area(file, width, height)
-    if not complete or not ends or max(ends) > file.stat().st_size:
+    if not complete:
         raise _damaged(file, "TIFF")
+    _check_area(file, width, height)
     kind = str(np.dtype(page.dtype)) if page.dtype else f"{page.bitspersample} bit"
     if kind in ("uint16", "float32", "float64"):
         return _deep_tiff(file, page, np.dtype(kind))

@@ -91,7 +91,7 @@ def _polygon_mesh(
     names = next((pair for pair in _UV_NAMES if set(pair) <= vertex.keys()), None)
     if names is not None:
         vertex_uvs = np.stack([vertex[name] for name in names], axis=1)
-        if corners.size and 0 <= corners.min() and corners.max() < len(vertex_uvs):
+        if corners.size and corners.min() >= 0 and corners.max() < len(vertex_uvs):
             uvs = vertex_uvs[corners]
     elif isinstance(wedges, _Lists) and np.array_equal(wedges.lengths, 2 * polygons.lengths):
         uvs = wedges.values.reshape(-1, 2)

@@ -58,7 +58,7 @@ def test_a_second_launch_makes_nothing_and_a_forced_one_everything(good: Any) ->
 
 
 def test_one_setting_remakes_only_what_depends_on_it(good: Any) -> None:
-    outcomes = good.launcher.launch(Request(FUR, [KEYS], given={"size": 64}))
+    outcomes = good.launcher.launch(Request(FUR, [KEYS], given={"width": 64}))
     assert [outcome.slot.asset for outcome in outcomes if outcome.state == "made"] == ["fur_frames"]
     # … and is remembered.
     outcomes = good.launcher.launch(Request(FUR, [KEYS]))
@@ -203,7 +203,7 @@ def test_a_step_inside_the_bound_is_a_regression_too(
         good.launcher.launch(Request(FUR, [PELT_KEYS], force=True))
     assert store.current(slot) == before
     # Other settings are another lineage: there is nothing to compare with.
-    good.launcher.launch(Request(FUR, [PELT_KEYS], force=True, given={"size": 80}))
+    good.launcher.launch(Request(FUR, [PELT_KEYS], force=True, given={"width": 80}))
     assert store.current(slot) != before
 
 

@@ -50,7 +50,8 @@ def test_first_hits_agree_with_brute_force(soup) -> None:
     # Rays that graze an edge may go either way in float32.
     clear = (np.abs(inside) > 1e-4).all(axis=1)
     hit = np.isfinite(nearest)
-    assert clear.mean() > 0.95 and 0.1 < hit[clear].mean() < 0.9
+    assert clear.mean() > 0.95
+    assert 0.1 < hit[clear].mean() < 0.9
 
     expected = np.where(hit, triangle, -1)
     np.testing.assert_array_equal(found.triangle[clear], expected[clear])
@@ -60,7 +61,8 @@ def test_first_hits_agree_with_brute_force(soup) -> None:
     from_distance = (origins + nearest[:, None] * directions)[both]
     np.testing.assert_allclose(from_weights, from_distance, atol=2e-4)
     missed = clear & ~hit
-    assert np.isinf(found.distance[missed]).all() and (found.barycentric[missed] == 0).all()
+    assert np.isinf(found.distance[missed]).all()
+    assert (found.barycentric[missed] == 0).all()
     assert (found.distance.dtype, found.barycentric.dtype) == (np.float32, np.float32)
 
 

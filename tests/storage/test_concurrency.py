@@ -39,7 +39,7 @@ def test_a_reader_sees_whole_versions_while_a_writer_publishes(
 ) -> None:
     store = VersionedStore(tmp_path)
     writers.start("write_many", **_place(tmp_path, SLOT, 1, 1)).finish()
-    place = _place(tmp_path, SLOT, 2, 30, checks=checks, store={"keep": 2})
+    place = _place(tmp_path, SLOT, 2, 16, checks=checks, store={"keep": 2})
     writer = writers.start("write_many", **place)
     # Every value is compared with the number that the same version tells: a mixture would differ.
     read = [number_of(store.open(SLOT))]
@@ -48,7 +48,7 @@ def test_a_reader_sees_whole_versions_while_a_writer_publishes(
     writer.finish()
     read.append(number_of(store.open(SLOT)))
     assert read == sorted(read), "what is current went back"
-    assert read[-1] == 31
+    assert read[-1] == 17
     assert len(set(read)) >= 5, "the reader hardly saw the writer at work"
 
 
@@ -87,7 +87,7 @@ def test_writers_of_one_partition_lose_nothing(
     assert sorted(done.values()) == [*range(1, 9), *range(101, 109), *range(201, 209)]
     pointer = store.pointer(SLOT)
     assert pointer.version == max(done), "expected the version that was begun last"
-    good = (pointer.version, *pointer.earlier)
+    good = (max(done), *pointer.earlier)
     assert {name: intact_number(store, SLOT, name) for name in good} == done
     assert list(good) == sorted(good, reverse=True)
     assert pointer.candidates == ()

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import errno
 import os
+import shutil
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import dask
 import numpy as np
 import pytest
 import xarray as xr
@@ -30,7 +35,7 @@ def _noise(megabytes: float, seed: int) -> xr.Dataset:
     return xr.Dataset({"noise": ("x", values)})
 
 
-def _assert_one_sentence(error: StoreFullError, where: Path) -> None:
+def _assert_one_sentence(error: StoreError, where: Path) -> None:
     message = str(error)
     assert message.startswith(f"{where}")
     assert "the disk is full" in message
@@ -90,9 +95,10 @@ def small_store(small_disk: Path) -> VersionedStore:
 def _fill(disk: Path) -> Path:
     """Fill a disk to the last byte."""
     filler = disk / "filler"
-    with filler.open("wb", buffering=0) as file, pytest.raises(OSError, match="No space left"):
+    with filler.open("wb", buffering=0) as file, contextlib.suppress(OSError):
         while True:
             file.write(b"\0" * 4096)
+    assert shutil.disk_usage(disk).free == 0
     return filler
 
 
@@ -211,6 +217,49 @@ def test_no_room_for_a_chunk(
         store.write(SLOT, data.chunk({"x": 2**20}) if lazy else data, RECORD)
     if full:
         _assert_one_sentence(caught.value, _folder(store) / "staging")
+    before.assert_unchanged()
+
+
+@pytest.mark.parametrize("lazy", [False, True], ids=["eager", "lazy"])
+def test_chunks_under_way_do_not_make_the_folder_anew(
+    store: VersionedStore,
+    fingerprint: Fingerprint,
+    monkeypatch: pytest.MonkeyPatch,
+    lazy: bool,
+) -> None:
+    """One chunk fails while others are being written, or computed: they come after the end."""
+    from zarr.storage import LocalStore
+
+    before = _Before(store, fingerprint)
+    store_one = LocalStore.set
+    slow: list[str] = []
+
+    async def fail_or_dawdle(self: LocalStore, key: str, value: Any) -> None:
+        if key == "noise/c/0":
+            await asyncio.sleep(0.02)
+            _no_room()
+        if key.startswith("noise/c/"):
+            slow.append(key)
+            await asyncio.sleep(0.05)
+        await store_one(self, key, value)
+
+    def compute_slowly(block: np.ndarray) -> np.ndarray:
+        if slow:
+            time.sleep(0.15)
+        return block
+
+    monkeypatch.setattr(zarr_files, "CHUNK_TARGET_BYTES", 2**20)
+    monkeypatch.setattr(LocalStore, "set", fail_or_dawdle)
+    data = _noise(6, 2)
+    if lazy:
+        data = data.chunk({"x": 2**20}).map(
+            lambda noise: noise.copy(data=noise.data.map_blocks(compute_slowly, dtype=np.uint8))
+        )
+    with dask.config.set(num_workers=4), pytest.raises(StoreFullError):
+        store.write(SLOT, data, RECORD)
+    assert slow, "no other chunk was under way"
+    before.assert_unchanged()
+    time.sleep(0.3)
     before.assert_unchanged()
 
 

@@ -132,57 +132,73 @@ def test_another_dtype_is_refused(dtype: str) -> None:
     assert f"variable 'angle' has dtype {dtype}; expected float32" in message
 
 
-@pytest.mark.parametrize("schema", _ALL, ids=lambda schema: f"{schema.system}-{schema.asset}")
-class TestEverySchema:
-    """What holds for each declared asset."""
+every_schema = pytest.mark.parametrize(
+    "schema", _ALL, ids=lambda schema: f"{schema.system}-{schema.asset}"
+)
 
-    def test_its_own_zeros_conform(self, schema: Schema) -> None:
-        conformed = schema.conform(_filled(schema))
-        for name, variable in schema.variables.items():
-            assert conformed[name].attrs["long_name"] == variable.meaning
-            assert conformed[name].attrs["units"] == variable.units
-            assert conformed[name].attrs.get("source", "") == variable.source
 
-    def test_each_variable_is_demanded(self, schema: Schema) -> None:
-        zeros = _filled(schema)
-        for name, variable in schema.variables.items():
-            without = zeros.drop_vars(name)
-            if variable.optional:
-                assert name not in schema.conform(without)
-            else:
-                assert f"{name!r} is missing" in _refusal(schema, without)
+@every_schema
+def test_its_own_zeros_conform(schema: Schema) -> None:
+    conformed = schema.conform(_filled(schema))
+    for name, variable in schema.variables.items():
+        assert conformed[name].attrs["long_name"] == variable.meaning
+        assert conformed[name].attrs["units"] == variable.units
+        assert conformed[name].attrs.get("source", "") == variable.source
 
-    def test_each_dtype_and_dimension_is_demanded(self, schema: Schema) -> None:
-        zeros = _filled(schema)
-        for name, variable in schema.variables.items():
-            other = "int16" if variable.dtype != "int16" else "int8"
-            message = _refusal(schema, zeros.assign({name: zeros[name].astype(other)}))
-            assert f"{name!r} has dtype {other}; expected {variable.dtype}" in message
-            message = _refusal(schema, zeros.assign({name: zeros[name].expand_dims("more")}))
-            assert f"{name!r} has dimensions ('more'," in message
-            assert f"expected {variable.dims}" in message
 
-    def test_the_table_holds_every_variable(self, schema: Schema) -> None:
-        header, rule, *rows = schema.markdown().splitlines()
-        cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
-        assert header.count("|") == rule.count("|") == 6
-        assert [row[0] for row in cells] == [f"`{name}`" for name in schema.variables]
-        for row, variable in zip(cells, schema.variables.values(), strict=True):
-            assert len(row) == 5, "expected no bar in a cell: it would cut the table"
-            assert row[1] == (" x ".join(variable.dims) if variable.dims else "scalar")
-            assert row[2:4] == [variable.dtype, variable.units]
-            assert variable.meaning in row[4] and variable.source in row[4]
-            assert ("*(where known)*" in row[4]) == variable.optional
+@every_schema
+def test_each_variable_is_demanded(schema: Schema) -> None:
+    zeros = _filled(schema)
+    for name, variable in schema.variables.items():
+        without = zeros.drop_vars(name)
+        if variable.optional:
+            assert name not in schema.conform(without)
+        else:
+            assert f"{name!r} is missing" in _refusal(schema, without)
 
-    def test_it_says_what_it_means(self, schema: Schema) -> None:
-        assert schema.meaning.endswith(".") and "\n" not in schema.meaning
-        for variable in schema.variables.values():
-            assert variable.meaning and variable.units and "\n" not in variable.meaning
-            assert not variable.meaning.endswith(".")
-            assert np.dtype(variable.dtype).kind in "biuf", "Zarr v3 holds numbers only"
 
-    def test_it_is_found_by_its_name(self, schema: Schema) -> None:
-        assert find_schema(schema.system, schema.asset) is schema
+@every_schema
+def test_each_dtype_and_dimension_is_demanded(schema: Schema) -> None:
+    zeros = _filled(schema)
+    for name, variable in schema.variables.items():
+        other = "int16" if variable.dtype != "int16" else "int8"
+        message = _refusal(schema, zeros.assign({name: zeros[name].astype(other)}))
+        assert f"{name!r} has dtype {other}; expected {variable.dtype}" in message
+        message = _refusal(schema, zeros.assign({name: zeros[name].expand_dims("more")}))
+        assert f"{name!r} has dimensions ('more'," in message
+        assert f"expected {variable.dims}" in message
+
+
+@every_schema
+def test_the_table_holds_every_variable(schema: Schema) -> None:
+    header, rule, *rows = schema.markdown().splitlines()
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+    assert header.count("|") == rule.count("|") == 6
+    assert [row[0] for row in cells] == [f"`{name}`" for name in schema.variables]
+    for row, variable in zip(cells, schema.variables.values(), strict=True):
+        assert len(row) == 5, "expected no bar in a cell: it would cut the table"
+        assert row[1] == (" x ".join(variable.dims) if variable.dims else "scalar")
+        assert row[2:4] == [variable.dtype, variable.units]
+        assert variable.meaning in row[4]
+        assert variable.source in row[4]
+        assert ("*(where known)*" in row[4]) == variable.optional
+
+
+@every_schema
+def test_it_says_what_it_means(schema: Schema) -> None:
+    assert schema.meaning.endswith(".")
+    assert "\n" not in schema.meaning
+    for variable in schema.variables.values():
+        assert variable.meaning
+        assert variable.units
+        assert "\n" not in variable.meaning
+        assert not variable.meaning.endswith(".")
+        assert np.dtype(variable.dtype).kind in "biuf", "Zarr v3 holds numbers only"
+
+
+@every_schema
+def test_it_is_found_by_its_name(schema: Schema) -> None:
+    assert find_schema(schema.system, schema.asset) is schema
 
 
 def test_names_of_assets_are_unique() -> None:

@@ -205,8 +205,8 @@ def test_all_is_on_disk_before_the_pointer_names_it(
     monkeypatch.setattr(os, "rename", note_rename)
     monkeypatch.setattr(os, "replace", note_replace)
     version = _write(store, slot, 1)
-    staged = [event for event in events[: events.index("rename versions")]]
-    files = [path for path in store.folder(slot).rglob("*")]
+    staged = events[: events.index("rename versions")]
+    files = list(store.folder(slot).rglob("*"))
     expected = {f"fsync staging/{version}/{path.relative_to(store.folder(slot))}" for path in files}
     assert set(staged) == {*expected, f"fsync staging/{version}"}
     beside = [event for event in events if event.startswith("fsync current.json.")]
@@ -401,7 +401,9 @@ def test_every_order_of_verdicts_on_three_candidates(tmp_path: Path, slot: Slot)
 
 def test_a_check_is_about_the_version_of_its_run(store: VersionedStore, slot: Slot) -> None:
     good = _write(store, slot, 0, run="first")
-    second, third = (_write(store, slot, i, "sharp", run=run) for i, run in ((1, "2nd"), (2, "3rd")))
+    second, third = (
+        _write(store, slot, i, "sharp", run=run) for i, run in ((1, "2nd"), (2, "3rd"))
+    )
     assert store.version_under_check(slot, "2nd") == second
     assert store.version_under_check(slot, "3rd") == third
     assert store.version_under_check(slot, "first") == good

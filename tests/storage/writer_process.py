@@ -46,7 +46,7 @@ def numbered(number: int) -> xr.Dataset:
     return xr.Dataset(
         {
             "eager": (("y", "x"), field),
-            "lazy": (("y", "x"), da.from_array(-field, chunks=(4, SIDE))),
+            "lazy": (("y", "x"), da.from_array(-field, chunks=(8, SIDE))),
             "number": ((), number),
         },
         coords={"y": np.arange(SIDE) * number},

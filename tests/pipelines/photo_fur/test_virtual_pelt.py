@@ -45,13 +45,17 @@ def pelt() -> module.Pelt:
 
 
 def test_picture_and_depth_are_well_formed(pelt) -> None:
-    assert pelt.radiance.shape == (64, 64, 3) and pelt.depth.shape == (64, 64)
+    assert pelt.radiance.shape == (64, 64, 3)
+    assert pelt.depth.shape == (64, 64)
     assert pelt.radiance.dtype == pelt.depth.dtype == np.float32
     for values in pelt:
-        assert np.isfinite(values).all() and values.min() >= 0 and values.max() <= 1
+        assert np.isfinite(values).all()
+        assert values.min() >= 0
+        assert values.max() <= 1
     assert (pelt.radiance == 1).any(axis=-1).mean() < 0.005
     assert 0.15 < (pelt.radiance @ LUMINANCE).mean() < 0.6
-    assert pelt.depth.min() < 0.35 and 0.3 < np.median(pelt.depth) < 0.8
+    assert pelt.depth.min() < 0.35
+    assert 0.3 < np.median(pelt.depth) < 0.8
 
 
 def test_equal_arguments_give_equal_bits_and_other_seeds_other_fur() -> None:
@@ -64,7 +68,8 @@ def test_equal_arguments_give_equal_bits_and_other_seeds_other_fur() -> None:
 def test_progress_rises_to_one() -> None:
     done: list[float] = []
     virtual_pelt(8, 20, 6, 0, progress=done.append)
-    assert len(done) == 6 and done[-1] == pytest.approx(1)
+    assert len(done) == 6
+    assert done[-1] == pytest.approx(1)
     assert all(a < b for a, b in zip([0.0, *done], done, strict=False))
 
 
@@ -90,10 +95,14 @@ def test_empty_requests_are_refused(arguments) -> None:
 def test_hairs_grow_from_the_skin_and_taper() -> None:
     hairs = grow_hairs(500, generator())
     roots = hairs.points[:, 0]
-    assert (roots[:, :2] >= 0).all() and (roots[:, :2] < 1).all() and (roots[:, 2] == 0).all()
+    assert (roots[:, :2] >= 0).all()
+    assert (roots[:, :2] < 1).all()
+    assert (roots[:, 2] == 0).all()
     assert (hairs.points[:, 1:, 2] > 0).all()
-    assert (hairs.radii[:, -1] < 0.3 * hairs.radii.max(axis=1)).all() and (hairs.radii > 0).all()
-    assert (hairs.albedo > 0).all() and (hairs.albedo < 1).all()
+    assert (hairs.radii[:, -1] < 0.3 * hairs.radii.max(axis=1)).all()
+    assert (hairs.radii > 0).all()
+    assert (hairs.albedo > 0).all()
+    assert (hairs.albedo < 1).all()
     assert (np.diff(hairs.albedo, axis=1) < 0).all()  # one hue: red over green over blue
 
 
@@ -126,7 +135,7 @@ def test_depth_is_the_first_triangle_below_each_pixel(monkeypatch) -> None:
     top = corners[..., 2].max()
     rng = generator()
     agree = 0
-    for row, column in rng.integers(0, size, (60, 2)):
+    for row, column in rng.integers(0, size, (40, 2)):
         here = np.array([(column + 0.5) / size, 1 - (row + 0.5) / size])
         a, b, c = (corners[:, k, :2] - here for k in range(3))
 
@@ -139,7 +148,7 @@ def test_depth_is_the_first_triangle_below_each_pixel(monkeypatch) -> None:
         under = (weights >= 0).all(axis=1)
         heights = (weights * corners[total != 0, :, 2]).sum(axis=1)[under]
         agree += abs(depth[row, column] - (1 - heights.max() / top)) < 1e-4
-    assert agree >= 59  # a ray through an edge may go either way in float32
+    assert agree >= 39  # a ray through an edge may go either way in float32
     assert 0.01 < (depth == 1).mean() < 0.99
 
 
@@ -208,7 +217,7 @@ def test_lone_hair_has_the_closed_form_of_its_scattering() -> None:
     """
     albedo = (0.9, 0.6, 0.3)
     picture = photograph_pelt(
-        straight_hair(0.3, 0.08, albedo), 64, 64, generator(), source_exponent=2, bounces=0
+        straight_hair(0.3, 0.08, albedo), 64, 32, generator(), source_exponent=2, bounces=0
     )
     ridge = picture.radiance[30:34].mean(axis=(0, 1))
     expected = np.array(albedo) * (3 / 8 + BACKSCATTER / math.pi)
@@ -266,7 +275,6 @@ def test_white_fur_under_an_even_sky_vanishes() -> None:
         means.append(picture.radiance.mean())
     assert means[0] < means[1] < means[2]
     assert means[1] < 0.95
-    print(means)
     assert means[2] == pytest.approx(1, abs=0.015)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 import struct
 import zlib
 from collections.abc import Callable
@@ -38,7 +39,7 @@ def light_of(codes: NDArray[Any]) -> NDArray[np.float64]:
         encoded = code / np.iinfo(codes.dtype).max
         return encoded / 12.92 if encoded <= 0.04045 else ((encoded + 0.055) / 1.055) ** 2.4
 
-    return np.vectorize(decode, otypes=[float])(codes)
+    return np.array(np.vectorize(decode, otypes=[float])(codes))
 
 
 def png_bytes(pixels: NDArray[Any], colour_type: int, *chunks: tuple[bytes, bytes]) -> bytes:
@@ -108,7 +109,7 @@ def adapted_primaries(red: tuple[float, float], green: tuple[float, float]) -> N
         [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
     )
     scale = np.diag(cone @ [0.9642, 1, 0.8249] / (cone @ d65))
-    return np.linalg.inv(cone) @ scale @ cone @ to_xyz
+    return np.array(np.linalg.inv(cone) @ scale @ cone @ to_xyz)
 
 
 DISPLAY_P3 = adapted_primaries((0.68, 0.32), (0.265, 0.69))
@@ -142,7 +143,7 @@ def test_neighbouring_16_bit_codes_stay_apart(tmp_path_factory: Any, code: int) 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
 @pytest.mark.parametrize("byteorder", ["<", ">"])
-def test_16_bit_tiff(tmp_path: Path, compression: str | None, byteorder: str) -> None:
+def test_16_bit_tiff(tmp_path: Path, compression: str | None, byteorder: Any) -> None:
     codes = picture(np.uint16)
     file = tmp_path / "fur.tif"
     tifffile.imwrite(file, codes, photometric="rgb", compression=compression, byteorder=byteorder)
@@ -415,9 +416,8 @@ REFUSED: list[tuple[str, str, Callable[[Path], Any]]] = [
 
 def one_sentence(error: BadInput, file: str) -> str:
     text = str(error)
-    assert text.startswith(f"{file}: ")
-    assert text.endswith(".") and ". " not in text and "\n" not in text
-    assert " is " in text and "; expected " in text
+    assert re.fullmatch(re.escape(file) + r": .+ is .+; expected .+\.", text)
+    assert ". " not in text
     return text
 
 
