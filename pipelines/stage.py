@@ -275,7 +275,7 @@ class Stage:
         self._plotter.close()
 
     def add(self, *actors: Any) -> None:
-        """Put actors on the stage."""
+        """Put actors on the stage; an actor and its textures are on one stage at a time."""
         for actor in actors:
             self._renderer.AddActor(actor)
 
@@ -367,11 +367,12 @@ def require_graphics() -> None:
     if not sys.platform.startswith("linux"):
         return
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    from vtkmodules.vtkCommonCore import vtkObject
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
     from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
 
-    warnings = vtkObject.GetGlobalWarningDisplay()
+    warnings, verbosity = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
     vtkObject.SetGlobalWarningDisplay(0)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     try:
         window = vtkEGLRenderWindow()
         window.SetOffScreenRendering(True)
@@ -380,6 +381,7 @@ def require_graphics() -> None:
         window.Finalize()
     finally:
         vtkObject.SetGlobalWarningDisplay(warnings)
+        vtkLogger.SetStderrVerbosity(verbosity)
     if not works:
         raise NoGraphicsError(
             "OpenGL cannot be started: EGL found no driver; expected a graphics card's driver or "

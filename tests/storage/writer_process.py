@@ -83,15 +83,23 @@ def write_many(
 
 
 def write_and_die(
-    report: Report, *, target: str, holding: str, call: int, when: str, **arguments: Any
+    report: Report,
+    *,
+    root: str,
+    target: str,
+    holding: str,
+    call: int,
+    when: str,
+    **arguments: Any,
 ) -> None:
     """Write (see write_many), but be killed in the ``call``-th call of a function.
 
-    ``target`` is ``module:name``; only calls with ``holding`` in an argument count. ``when`` is
-    ``enter``, ``leave``, or ``half``: having written half of what ``json.dump`` would write.
+    ``target`` is ``module:name``; only calls with ``holding`` in an argument count (the root's
+    own path apart). ``when`` is ``enter``, ``leave``, or ``half``: having written half of what
+    ``json.dump`` would write.
     """
-    _die_in(target, holding, call, when)
-    write_many(report, **arguments)
+    _die_in(root, target, holding, call, when)
+    write_many(report, root=root, **arguments)
 
 
 def reject_and_die(
@@ -106,7 +114,7 @@ def reject_and_die(
     version: str,
 ) -> None:
     """Reject a version, but be killed in a function (see write_and_die)."""
-    _die_in(target, holding, call, when)
+    _die_in(root, target, holding, call, when)
     VersionedStore(root).reject(Slot(*slot), version, "sharp", "seen to be blurred")
 
 
@@ -156,7 +164,7 @@ JOBS: dict[str, Callable[..., None]] = {
 }
 
 
-def _die_in(target: str, holding: str, call: int, when: str) -> None:
+def _die_in(root: str, target: str, holding: str, call: int, when: str) -> None:
     module, _, path = target.partition(":")
     owner: Any = importlib.import_module(module)
     *outer, name = path.split(".")
@@ -168,7 +176,7 @@ def _die_in(target: str, holding: str, call: int, when: str) -> None:
     @functools.wraps(function)
     def wrapped(*arguments: Any, **keywords: Any) -> Any:
         nonlocal calls
-        calls += any(holding in str(argument) for argument in arguments)
+        calls += any(holding in str(argument).replace(root, "") for argument in arguments)
         if calls < call:
             return function(*arguments, **keywords)
         if when == "half":

@@ -7,13 +7,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.photo_fur.attenuation import MOST_LAYERS
 from pipelines.photo_fur.shells import shell_heights, shell_vertices
 
 
+@settings(deadline=None)
 @given(st.floats(1e-6, 1e6), st.integers(1, MOST_LAYERS))
 def test_heights_are_equation_3(thickness: float, layers: int) -> None:
     """h(n) = (n/N) hb is the depth from the tips: the height is what is left."""
@@ -23,6 +24,7 @@ def test_heights_are_equation_3(thickness: float, layers: int) -> None:
     assert heights[-1] == 0.0
 
 
+@settings(deadline=None)
 @given(st.floats(0.01, 10.0), st.integers(2, 60))
 def test_steps_are_equal_and_the_first_is_a_step_below_the_thickness(
     thickness: float, layers: int
