@@ -16,7 +16,6 @@ import dagster as dg
 from assets_defs.rematerialisation import LaunchConfig
 from assets_defs.system import Dimension, Source, System
 from assets_defs.workspace import Workspace
-from storage.slugs import slug
 
 SETTLED_SECONDS = 3.0
 """A file that changed more recently may still be on its way."""
@@ -42,12 +41,14 @@ def inbox_sensor(
         for system in systems.values():
             for dimension in system.dimensions:
                 partitions = system.dynamic(dimension.name)
-                registered = set(
-                    context.instance.get_dynamic_partitions(str(partitions.name))
-                )
+                registered = set(context.instance.get_dynamic_partitions(str(partitions.name)))
                 new = set(dimension.builtin) - registered
                 for path in system.files(dimension.name, workspace.inbox(system.name)):
-                    name, key, stamp = f"{system.name}/{path.name}", slug(path.stem), _stamp(path)
+                    name, key, stamp = (
+                        f"{system.name}/{path.name}",
+                        Source.of(path).key,
+                        _stamp(path),
+                    )
                     if stamp is None:
                         now |= {name: seen[name]} if name in seen else {}
                         continue
@@ -84,16 +85,14 @@ def take_in(
         )
     dimension.read(path)
     inbox = workspace.inbox(system.name)
-    source = Source(slug(path.stem), path)
-    digits = source.fingerprint[:8]
-    for name in (path.name, f"{path.stem}-{digits}{path.suffix}"):
+    fingerprint = Source.of(path).fingerprint
+    for name in (path.name, f"{path.stem}-{fingerprint[:8]}{path.suffix}"):
         target = inbox / name
-        taken = system.sources(dimension.name, inbox).get(slug(target.stem))
-        if taken is None or (taken.path == target and taken.fingerprint == source.fingerprint):
+        if not target.exists() or Source.of(target).fingerprint == fingerprint:
             break
-    key = slug(target.stem)
+    key = Source.of(target).key
     instance.add_dynamic_partitions(str(system.dynamic(dimension.name).name), [key])
-    if taken is None:
+    if not target.exists():
         inbox.mkdir(parents=True, exist_ok=True)
         beside = target.with_name(f".{target.name}.part")
         shutil.copyfile(path, beside)

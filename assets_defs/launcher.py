@@ -69,9 +69,8 @@ class Launcher:
         """
         planned = self._plan(request)
         for dimension in request.system.dimensions:
-            keys = _keys(request, dimension.name)
             name = request.system.dynamic(dimension.name).name
-            self.instance.add_dynamic_partitions(str(name), keys)
+            self.instance.add_dynamic_partitions(str(name), _keys(request, dimension.name))
         outcomes: list[Outcome] = []
         for done, (by, keys) in enumerate(planned):
             self.progress(request.system.name, done / len(planned))
@@ -153,7 +152,8 @@ class Launcher:
             if event.is_step_success:
                 name = event.node_name.removeprefix(f"{system.name}__")
                 asset = next(
-                    a for a in sorted(stale, key=len, reverse=True)
+                    a
+                    for a in sorted(stale, key=len, reverse=True)
                     if name == a or name.startswith(f"{a}_")
                 )
                 spent = event.step_success_data.duration_ms / 1000
@@ -163,9 +163,7 @@ class Launcher:
     def _grain_plans(self, system: System, by: tuple[str, ...]) -> list[AssetPlan]:
         return [plan for plan in system.plans.values() if plan.by == by]
 
-    def _settings(
-        self, request: Request, plan: AssetPlan, keys: Mapping[str, str]
-    ) -> Settings:
+    def _settings(self, request: Request, plan: AssetPlan, keys: Mapping[str, str]) -> Settings:
         fields = plan.settings.model_fields
         given = {name: value for name, value in request.given.items() if name in fields}
         return request.system.resolve(
@@ -211,9 +209,7 @@ def _projections(
 
 def _given(settings: Settings) -> dict[str, Any]:
     return {
-        name: value
-        for name, value in settings.model_dump(mode="json").items()
-        if value is not None
+        name: value for name, value in settings.model_dump(mode="json").items() if value is not None
     }
 
 

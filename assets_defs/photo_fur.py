@@ -113,9 +113,7 @@ def _clipped_share(checked: Checked) -> float:
         ),
     ),
 )
-def fur_photo(
-    settings: PhotoSettings, source: Source, progress: Callable[[float], None]
-) -> Result:
+def fur_photo(settings: PhotoSettings, source: Source, progress: Callable[[float], None]) -> Result:
     """Read the photograph, or photograph the virtual pelt."""
     import xarray as xr
 
@@ -160,7 +158,10 @@ class AttenuationSettings(Settings):
     """How the histogram is read."""
 
     tail: float = Field(
-        0.005, ge=0.0, lt=0.5, description="Share of the pixels cut off at each end of the histogram"
+        0.005,
+        ge=0.0,
+        lt=0.5,
+        description="Share of the pixels cut off at each end of the histogram",
     )
     layers: Layers = 15
 
@@ -253,14 +254,16 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
     fitted = fit_attenuation(luminance, tail=settings.tail)
     histogram = luminance_histogram(luminance)
     layer = layer_of(luminance, fitted, settings.layers, tails="dropped")
+    pixels = np.bincount(layer.ravel(), minlength=settings.layers + 1)[1:]
+    boundaries = fitted.boundaries(settings.layers)
     variables = {
         "histogram": ("bin", histogram.counts),
         "bin_edge": ("edge", histogram.edges),
         "brightest": ((), fitted.brightest),
         "darkest": ((), fitted.darkest),
         "attenuation": ((), fitted.coefficient),
-        "boundary_luminance": ("boundary", fitted.boundaries(settings.layers)),
-        "pixels_per_layer": ("layer", np.bincount(layer.ravel(), minlength=settings.layers + 1)[1:]),
+        "boundary_luminance": ("boundary", boundaries),
+        "pixels_per_layer": ("layer", pixels),
         "bright_tail": ((), np.int64(np.count_nonzero(luminance > fitted.brightest))),
         "dark_tail": ((), np.int64(np.count_nonzero(luminance < fitted.darkest))),
     }
@@ -276,12 +279,7 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
     rows = [
         {"layer": n + 1, "from I": float(above), "to I": float(below), "pixels": int(count)}
         for n, (above, below, count) in enumerate(
-            zip(
-                variables["boundary_luminance"][1][:-1],
-                variables["boundary_luminance"][1][1:],
-                variables["pixels_per_layer"][1],
-                strict=True,
-            )
+            zip(boundaries[:-1], boundaries[1:], pixels, strict=True)
         )
     ]
     return xr.Dataset(variables), {**figures, "layers": table(rows)}
@@ -356,9 +354,7 @@ def _interval_error(checked: Checked) -> float:
         ),
     ),
 )
-def shell_stack(
-    settings: StackSettings, fur_photo: xr.Dataset, attenuation: xr.Dataset
-) -> Result:
+def shell_stack(settings: StackSettings, fur_photo: xr.Dataset, attenuation: xr.Dataset) -> Result:
     """The layer of every pixel, and the layers' masks."""
     import xarray as xr
 
@@ -390,7 +386,10 @@ class MeshSettings(Settings):
         description="Thickness of the fur in mesh units; by default 6 % of the mesh's radius",
     )
     repeats: float = Field(
-        1.0, gt=0.0, le=1000.0, description="Times the photograph is repeated along its texture axes"
+        1.0,
+        gt=0.0,
+        le=1000.0,
+        description="Times the photograph is repeated along its texture axes",
     )
 
     @classmethod

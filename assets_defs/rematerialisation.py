@@ -18,9 +18,9 @@ class LaunchConfig(dg.Config):
 
     system: str = Field(description="Name of the system; empty: all of them")
     partitions: list[dict[str, str]] = Field(
-        [], description="Keys by dimension; empty: everything that was ever made"
+        default=[], description="Keys by dimension; empty: everything that was ever made"
     )
-    force: bool = Field(False, description="Also run what is current")
+    force: bool = Field(default=False, description="Also run what is current")
 
 
 def launch_job(systems: Mapping[str, System], job: JobByName) -> dg.JobDefinition:

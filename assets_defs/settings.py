@@ -52,12 +52,12 @@ def resolve(
     """
     if preset is not None and preset not in PRESETS:
         raise SettingsError(f"preset is {preset!r}; expected one of {', '.join(PRESETS)}.")
-    name = typing.cast(Preset, preset or DEFAULT_PRESET)
+    name = preset or DEFAULT_PRESET
     base = settings.preset(name, keys).model_dump()
     if preset is None and current is not None:
         base |= {field: value for field, value in current.items() if field in base}
     try:
-        return settings(**(base | given))
+        return settings(**(base | dict(given)))
     except pydantic.ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "settings"
@@ -75,7 +75,7 @@ def config_class(settings: type[Settings]) -> type[dg.Config]:
         about = pydantic.Field(default=None, description=field.description)
         fields[name] = (_plain_type(field.annotation) | None, about)
     made = pydantic.create_model(f"{settings.__name__}Config", __base__=dg.Config, **fields)
-    return typing.cast(type[dg.Config], made)
+    return made
 
 
 def _plain_type(annotation: Any) -> Any:

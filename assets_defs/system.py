@@ -67,6 +67,11 @@ class Source:
     key: str
     path: Path | None
 
+    @classmethod
+    def of(cls, path: Path) -> Source:
+        """A file; its ending is part of the key, so `fur.png` and `fur.jpg` are two sources."""
+        return cls(slug(f"{path.stem}-{path.suffix[1:]}"), path)
+
     @property
     def name(self) -> str:
         """The name that people know it by."""
@@ -137,21 +142,10 @@ class System:
         return "_".join((self.name, *by))
 
     def sources(self, dimension: str, inbox: Path) -> dict[str, Source]:
-        """Everything that a dimension has: built-in items and files in the inbox, by key.
-
-        Raises ValueError where two of them would have the same key.
-        """
-        chosen = self.dimension(dimension)
-        found = {key: Source(key, None) for key in chosen.builtin}
-        for path in self.files(dimension, inbox):
-            key = slug(path.stem)
-            if key in found:
-                raise ValueError(
-                    f"{path}: name is taken by {found[key].path or 'a built-in item'}; "
-                    f"expected a {dimension} with a name of its own."
-                )
-            found[key] = Source(key, path)
-        return found
+        """Everything that a dimension has: built-in items and files in the inbox, by key."""
+        builtin = {key: Source(key, None) for key in self.dimension(dimension).builtin}
+        dropped = (Source.of(path) for path in self.files(dimension, inbox))
+        return builtin | {source.key: source for source in dropped}
 
     def files(self, dimension: str, inbox: Path) -> list[Path]:
         """The dimension's files in the inbox."""
@@ -201,9 +195,7 @@ class System:
             current=store.record(slot)["settings"] if has_current else None,
         )
 
-    def source_of(
-        self, plan: AssetPlan, keys: Mapping[str, str], inbox: Path
-    ) -> Source | None:
+    def source_of(self, plan: AssetPlan, keys: Mapping[str, str], inbox: Path) -> Source | None:
         """The source of an asset that has one. Raises ValueError where it is gone."""
         if not plan.from_source:
             return None
@@ -326,9 +318,10 @@ class System:
             # What the user gave cannot work: a second try would not either.
             raise dg.Failure(description=str(error), allow_retries=False) from error
         records = {name: data.attrs[RECORD] for name, data in inputs.items()}
-        record = provenance(
-            plan, settings, source.fingerprint if source else None, records
-        ) | {"run": context.run.run_id, "checks": [check.name for check in plan.checks]}
+        record = provenance(plan, settings, source.fingerprint if source else None, records) | {
+            "run": context.run.run_id,
+            "checks": [check.name for check in plan.checks],
+        }
         shown = plan.pictures(dataset) if plan.pictures else {}
         thumbnails = {name: thumbnail(picture) for name, picture in shown.items()}
         return dg.Output(
@@ -388,4 +381,3 @@ def partition_key(keys: Mapping[str, str]) -> str:
 def partition_keys(context: Any, by: Sequence[str]) -> dict[str, str]:
     """The keys of a run's partition by dimension."""
     return dict(zip(sorted(by), context.partition_key.split("|"), strict=True))
-

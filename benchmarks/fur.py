@@ -218,7 +218,8 @@ def _frames() -> dict[str, Any]:
         "texture_bytes_usual": 4 * pixels * LAYERS,
         "texture_bytes_ratio": 1 / LAYERS,
     }
-    for fill, suffix in (("columns", ""), ("bands", "_bands")):
+    fills: tuple[tuple[Fill, str], ...] = (("columns", ""), ("bands", "_bands"))
+    for fill, suffix in fills:
         with Stage(*WINDOW, background=BACKGROUND) as stage:
             ours = [_ours(photo, mesh, shells, fill)]
             usual, textures = _usual(photo, mesh, shells, fill)
@@ -288,8 +289,7 @@ def _import() -> dict[str, Any]:
     code = "import time; t = time.perf_counter(); import assets_defs.entry; "
     code += "print(time.perf_counter() - t)"
     spent = [
-        float(subprocess.check_output([sys.executable, "-c", code], cwd=CHECKOUT))
-        for _ in range(5)
+        float(subprocess.check_output([sys.executable, "-c", code], cwd=CHECKOUT)) for _ in range(5)
     ]
     return {"import_definitions_s": min(spent)}
 

@@ -1,0 +1,1 @@
+"""Numerics: arrays in, arrays out. Knows neither Dagster nor Zarr nor files."""

@@ -129,17 +129,24 @@ def texture(
 ) -> Any:
     """An array (height, width, channels) as a VTK texture; row 0 is the top of the picture.
 
-    uint8 stays 8 bit a channel; ``srgb`` says that its colours are sRGB codes, decoded when they
-    are sampled (alpha is not). float32 stays float32.
+    One channel is grey, two are red and green. uint8 stays 8 bit a channel; ``srgb`` says that its
+    colours are sRGB codes, decoded when they are sampled (alpha is not). float32 stays float32.
     """
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLTexture
 
-    if image.dtype not in (np.uint8, np.float32) or image.ndim != 3:
+    known = image.dtype in (np.uint8, np.float32) and image.ndim == 3 and 1 <= image.shape[2] <= 4
+    if not known:
         raise ValueError(
-            f"texture is {image.dtype} {image.shape}; expected uint8 or float32 (y, x, channel)."
+            f"texture is {image.dtype} {image.shape}; expected uint8 or float32 (y, x, channel) "
+            "with 1 to 4 channels."
         )
+    # VTK would draw one or two channels through a colour map, in 8 bit.
+    if image.shape[2] == 1:
+        image = image.repeat(3, axis=2)
+    elif image.shape[2] == 2:
+        image = np.pad(image, ((0, 0), (0, 0), (0, 1)))
     height, width, channels = image.shape
     flipped = np.ascontiguousarray(image[::-1]).reshape(-1, channels)
     data = vtkImageData()
@@ -189,7 +196,8 @@ def surface(
     from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLPolyDataMapper
 
     corners = np.asarray(triangles)
-    mesh = pv.PolyData.from_regular_faces(np.asarray(vertices, dtype=np.float32), corners)
+    points: Any = np.asarray(vertices, dtype=np.float32)
+    mesh = pv.PolyData.from_regular_faces(points, corners)
     if normals is not None:
         mesh.point_data.active_normals = np.asarray(normals, dtype=np.float32)
     mapper = vtkOpenGLPolyDataMapper()
@@ -198,9 +206,7 @@ def surface(
     mapper.SetVBOShiftScaleMethod(0)
     for name, values in (attributes or {}).items():
         mesh.point_data[name] = np.asarray(values, dtype=np.float32)
-        mapper.MapDataArrayToVertexAttribute(
-            name, name, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1
-        )
+        mapper.MapDataArrayToVertexAttribute(name, name, vtkDataObject.FIELD_ASSOCIATION_POINTS, -1)
     actor = vtkActor()
     actor.SetMapper(mapper)
     looks = actor.GetProperty()
@@ -245,12 +251,13 @@ class Stage:
 
         self.width, self.height, self.supersampling = width, height, supersampling
         size = (width * supersampling, height * supersampling)
-        self._plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
-        self._window = self._plotter.render_window
-        self._window.SetMultiSamples(0)
+        self._plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
+        window: Any = self._plotter.render_window
+        self._window = window
+        window.SetMultiSamples(0)
         self._renderer = self._plotter.renderer
-        self._window.Render()
-        for buffer in (self._window.GetRenderFramebuffer(), self._window.GetDisplayFramebuffer()):
+        window.Render()
+        for buffer in (window.GetRenderFramebuffer(), window.GetDisplayFramebuffer()):
             buffer.PopulateFramebuffer(*size, True, 1, _VTK_FLOAT, True, 32, 0, False)
         self._has_sky = isinstance(background, np.ndarray)
         if isinstance(background, np.ndarray):

@@ -54,5 +54,7 @@ class ZarrIOManager(dg.IOManager):
 
 def _slot(context: Any) -> Slot:
     system, asset = context.asset_key.path
-    partition = context.asset_partition_key.replace("|", ".") if context.has_asset_partitions else ""
+    partition = (
+        context.asset_partition_key.replace("|", ".") if context.has_asset_partitions else ""
+    )
     return Slot(system, asset, partition or WHOLE)

@@ -226,9 +226,7 @@ def _fields(settings: Sequence[str]) -> Mapping[str, Any]:
     return fields
 
 
-def _report(
-    session: Session, outcomes: Sequence[Outcome], seconds: float, as_json: bool
-) -> None:
+def _report(session: Session, outcomes: Sequence[Outcome], seconds: float, as_json: bool) -> None:
     reports = outcome_reports(session.workspace.store, outcomes)
     if as_json:
         click.echo(json.dumps({"seconds": round(seconds, 3), "assets": reports}))

@@ -1,0 +1,1 @@
+"""Fur from one photograph (papers: section 3)."""

@@ -139,9 +139,7 @@ def depth_code(
     return np.where(layer == 0, DROPPED, code).astype(np.uint8)
 
 
-def depth_rank_correlation(
-    luminance: NDArray[np.floating], depth: NDArray[np.floating]
-) -> float:
+def depth_rank_correlation(luminance: NDArray[np.floating], depth: NDArray[np.floating]) -> float:
     """Spearman rank correlation of darkness with true depth: 1 = brightness orders depth."""
     from scipy.stats import spearmanr
 

@@ -105,9 +105,7 @@ def square_of_photograph(vertices: NDArray[Any], shape: tuple[int, int]) -> NDAr
     return (vertices * np.array([width / height, 1.0, 1.0])).astype(np.float32)
 
 
-def _cameras(
-    views: Sequence[View], points: NDArray[np.float32], aspect: float
-) -> list[Camera]:
+def _cameras(views: Sequence[View], points: NDArray[np.float32], aspect: float) -> list[Camera]:
     """One camera a view; all that are perspective stand equally far away."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = ((low + high) / 2).tolist()

@@ -26,8 +26,13 @@ def decay_picture(
     for value, name in ((attenuation.darkest, "Imin"), (attenuation.brightest, "Imax")):
         left.axvline(value, color="tab:red")
         left.annotate(
-            f" {name} = {value:.3g}", (value, 1.0), xycoords=("data", "axes fraction"),
-            va="top", color="tab:red", rotation=90, ha="right",
+            f" {name} = {value:.3g}",
+            (value, 1.0),
+            xycoords=("data", "axes fraction"),
+            va="top",
+            color="tab:red",
+            rotation=90,
+            ha="right",
         )
     left.set(xlabel="luminance (linear)", ylabel="pixels", xlim=(0, 1.05 * attenuation.brightest))
     depth = np.linspace(0, 1, 200)

@@ -27,8 +27,10 @@ from storage.versions import Slot
 def test_dagster_validates_the_workspace(tmp_path: Path) -> None:
     checkout = Path(__file__).parents[2]
     done = subprocess.run(
-        [str(Path(sys.executable).parent / "dagster"), "definitions", "validate"]
-        + ["-w", "workspace.yaml"],
+        [
+            str(Path(sys.executable).parent / "dagster"),
+            *("definitions", "validate", "-w", "workspace.yaml"),
+        ],
         cwd=checkout,
         env=os.environ | {"DAGSTER_HOME": str(tmp_path), "TSUYA_DATA": str(tmp_path / "data")},
         capture_output=True,
@@ -40,7 +42,7 @@ def test_dagster_validates_the_workspace(tmp_path: Path) -> None:
 
 def test_importing_the_definitions_imports_nothing_heavy() -> None:
     heavy = ("xarray", "zarr", "dask", "pyvista", "vtkmodules", "open3d", "scipy", "skimage")
-    code = "import sys, assets_defs.entry; print([m for m in %r if m in sys.modules])" % (heavy,)
+    code = f"import sys, assets_defs.entry; print([m for m in {heavy} if m in sys.modules])"
     checkout = Path(__file__).parents[2]
     printed = subprocess.check_output([sys.executable, "-c", code], cwd=checkout, text=True)
     assert printed.strip() == "[]"
@@ -49,7 +51,9 @@ def test_importing_the_definitions_imports_nothing_heavy() -> None:
 def test_the_graph_has_the_papers_shape(house: Any) -> None:
     graph = house.definitions.get_repository_def().asset_graph
     key = {name: dg.AssetKey(["photo_fur", name]) for name in FUR.plans}
-    parents = {name: {parent.path[-1] for parent in graph.get(key[name]).parent_keys} for name in key}
+    parents = {
+        name: {parent.path[-1] for parent in graph.get(key[name]).parent_keys} for name in key
+    }
     assert parents == {
         "fur_photo": set(),
         "attenuation": {"fur_photo"},
@@ -136,9 +140,7 @@ def test_the_schedule_makes_again_what_was_made(house: Any) -> None:
 def _materialisations(house: Any) -> dict[str, int]:
     counts = {}
     for name in FUR.plans:
-        events = house.instance.fetch_materializations(
-            dg.AssetKey(["photo_fur", name]), limit=1000
-        )
+        events = house.instance.fetch_materializations(dg.AssetKey(["photo_fur", name]), limit=1000)
         counts[name] = len(events.records)
     return counts
 
@@ -173,9 +175,7 @@ def _tick(house: Any, cursor: str | None) -> dg.SensorResult:
     )
     result = sensor.evaluate_tick(context)
     for request in result.dynamic_partitions_requests:
-        house.instance.add_dynamic_partitions(
-            request.partitions_def_name, request.partition_keys
-        )
+        house.instance.add_dynamic_partitions(request.partitions_def_name, request.partition_keys)
     return result
 
 

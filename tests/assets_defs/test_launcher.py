@@ -31,7 +31,7 @@ from pipelines.photo_fur import attenuation
 def test_bad_settings_are_refused_before_any_work(
     house: Any, given: dict[str, Any], words: tuple[str, ...]
 ) -> None:
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match=r"expected|should|may") as refusal:
         house.launcher.launch(Request(FUR, [{"photo": "grass", "mesh": "square"}], "test", given))
     assert all(word in str(refusal.value) for word in words)
     assert "\n" not in str(refusal.value)
@@ -66,7 +66,7 @@ def test_a_photograph_is_taken_in_once_and_apart_from_others_of_its_name(
     path = tmp_path / "grass.png"
     Image.fromarray(noise).save(path)
     built_in = take_in(path, FUR, FUR.dimension("photo"), house.workspace, house.instance)
-    assert built_in.startswith("grass-")
+    assert built_in == "grass-png"
     outcomes = house.launcher.launch(Request(FUR, [{"photo": keys[0]}], "test"))
     assert [outcome.state for outcome in outcomes] == ["made"] * 3
     stored = house.workspace.store.open(FUR.slot("fur_photo", {"photo": keys[0]}))
@@ -82,7 +82,7 @@ def test_a_failure_is_told_in_its_own_words_and_ends_the_launch(
         raise ValueError("the photograph has a single luminance.")
 
     monkeypatch.setattr(attenuation, "fit_attenuation", broken)
-    with pytest.raises(LaunchError, match="attenuation.*single luminance|single luminance"):
+    with pytest.raises(LaunchError, match=r"grass.*: the photograph has a single luminance"):
         house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test"))
     runs = house.instance.get_runs(filters=dg.RunsFilter(statuses=[dg.DagsterRunStatus.FAILURE]))
     assert [run.job_name for run in runs] == ["photo_fur_photo"]

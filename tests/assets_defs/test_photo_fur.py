@@ -116,9 +116,7 @@ def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -
 
 
 REGRESSIONS = (
-    Regression(
-        "contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5
-    ),
+    Regression("contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5),
     Regression(
         "clipped_share", photograph, "expose", lambda right, photo: np.clip(right(photo) * 6, 0, 1)
     ),

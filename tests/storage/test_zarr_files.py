@@ -208,11 +208,20 @@ def test_uneven_lazy_chunks_are_evened_out(tmp_path: Path) -> None:
     np.testing.assert_array_equal(open_dataset(tmp_path / "group")["field"], np.arange(10.0))
 
 
-def test_chunks_of_zeros_are_files_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zarr_files, "CHUNK_TARGET_BYTES", 5 * 8 * 2)
-    write_dataset(_varied()[["all_zero"]], tmp_path / "group", {})
-    assert _stored_chunks(tmp_path / "group", "all_zero") == (2, 5)
-    chunks = [path for path in (tmp_path / "group/all_zero/c").rglob("*") if path.is_file()]
+@pytest.mark.parametrize("lazy", [False, True], ids=["eager", "lazy"])
+@pytest.mark.parametrize(
+    ("dtype", "value"),
+    [("int64", 0), ("uint8", 0), ("bool", False), ("float32", 0.0), ("float32", np.nan)],
+)
+def test_chunks_of_the_fill_value_are_files_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dtype: str, value: float, lazy: bool
+) -> None:
+    field = np.full((6, 5), value, dtype)
+    monkeypatch.setattr(zarr_files, "CHUNK_TARGET_BYTES", 2 * field[0].nbytes)
+    data = da.from_array(field, chunks=(2, 5)) if lazy else field
+    write_dataset(xr.Dataset({"field": (("y", "x"), data)}), tmp_path / "group", {})
+    assert _stored_chunks(tmp_path / "group", "field") == (2, 5)
+    chunks = [path for path in (tmp_path / "group/field/c").rglob("*") if path.is_file()]
     assert len(chunks) == 3
 
 

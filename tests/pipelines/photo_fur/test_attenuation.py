@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -97,7 +98,7 @@ def test_the_histogram_counts_what_lies_between_its_edges(luminances: list[float
     counts, edges = luminance_histogram(np.array(luminances, np.float32))
     brute = [
         sum(low <= luminance < high for luminance in luminances)
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in itertools.pairwise(edges)
     ]
     np.testing.assert_array_equal(counts, brute)
     assert counts.sum() == len(luminances)
@@ -214,7 +215,9 @@ def test_the_masks_are_a_partition(cut: Cut, tails: Tails) -> None:
     masks = layer_masks(layer, cut.layers)
     assert masks.shape == (cut.layers, *layer.shape)
     np.testing.assert_array_equal(masks.sum(axis=0), layer != 0)
-    np.testing.assert_array_equal((masks * np.arange(1, cut.layers + 1)[:, None, None]).sum(0), layer)
+    np.testing.assert_array_equal(
+        (masks * np.arange(1, cut.layers + 1)[:, None, None]).sum(0), layer
+    )
 
 
 @settings(deadline=None)

@@ -20,7 +20,9 @@ def test_heights_are_equation_3(thickness: float, layers: int) -> None:
     """h(n) = (n/N) hb is the depth from the tips: the height is what is left."""
     exact = [Fraction(thickness) * (1 - Fraction(n, layers)) for n in range(1, layers + 1)]
     heights = shell_heights(thickness, layers)
-    np.testing.assert_allclose(heights, [float(h) for h in exact], rtol=1e-9, atol=1e-15 * thickness)
+    np.testing.assert_allclose(
+        heights, [float(h) for h in exact], rtol=1e-9, atol=1e-15 * thickness
+    )
     assert heights[-1] == 0.0
 
 
