@@ -1,6 +1,7 @@
 """Code versions that nobody has to remember to raise.
 
-An asset's code version is the hash of its own function and of every module of `pipelines` and of
+An asset's code version is the hash of its own function, of its module's functions and constants
+(numbers, texts, tuples of them) that it names, and of every module of `pipelines` and of
 `storage.readers` that it imports, directly or through others. The hash is over syntax trees without
 docstrings: a comment or a docstring changes no version.
 """
@@ -48,10 +49,18 @@ def _gather(function: Callable[..., Any], own: dict[str, str], modules: set[str]
             modules |= _reached(home)
         elif inspect.isfunction(value) and home == function.__module__:
             _gather(value, own, modules)
+        elif _is_name(node) and _is_constant(value):
+            own[f"{function.__module__}.{node.id}"] = repr(value)
 
 
 def _is_name(node: ast.AST) -> TypeGuard[ast.Name]:
     return isinstance(node, ast.Name)
+
+
+def _is_constant(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(_is_constant(part) for part in value)
+    return isinstance(value, int | float | str | bytes)
 
 
 def _imports(tree: ast.AST) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Fur from one photograph (papers: section 3): the graph's assets and checks."""
+"""Fur from one photograph (docs/fur.md): the graph's assets and checks."""
 
 from __future__ import annotations
 

@@ -102,11 +102,10 @@ def fitting_distance(
 
     ``aspect`` is width / height; angles in degrees as in ``orbit``.
     """
-    around, above = math.radians(azimuth), math.radians(elevation)
-    right = np.array([-math.sin(around), math.cos(around), 0.0])
-    back = np.array(
-        [math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)]
-    )
+    camera = orbit((0.0, 0.0, 0.0), 1.0, azimuth, elevation)
+    back = np.array(camera.position)
+    right = np.cross(camera.up, back)
+    right /= np.linalg.norm(right)
     up = np.cross(back, right)
     offsets = np.asarray(points, dtype=np.float64) - np.asarray(target)
     slope = math.tan(math.radians(view_angle / 2))

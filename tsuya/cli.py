@@ -160,7 +160,7 @@ def status(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps({"assets": reports}))
     else:
-        Console().print(status_table(reports))
+        _output().print(status_table(reports))
 
 
 @main.command()
@@ -190,6 +190,11 @@ def doctor(as_json: bool) -> None:
     for finding in findings if not as_json else ():
         click.echo(f"{'ok  ' if finding.met else 'FAIL'} {finding.requirement}: {finding.found}")
     sys.exit(0 if all(finding.met for finding in findings) else 1)
+
+
+def _output() -> Console:
+    """Standard output; a file or a pipe gets lines wide enough for the tables."""
+    return Console(width=None if sys.stdout.isatty() else 160)
 
 
 def _workspace() -> Workspace:
@@ -231,6 +236,6 @@ def _report(session: Session, outcomes: Sequence[Outcome], seconds: float, as_js
     if as_json:
         click.echo(json.dumps({"seconds": round(seconds, 3), "assets": reports}))
         return
-    Console().print(sizes_table(reports), figures_table(reports))
+    _output().print(sizes_table(reports), figures_table(reports))
     made = sum(1 for outcome in outcomes if outcome.state == "made")
     click.echo(f"{made} made, {len(outcomes) - made} current already, {seconds:.1f} s.")

@@ -25,6 +25,7 @@ from pipelines.stage import (
     Stage,
     Vector,
     Wrap,
+    fitting_distance,
     orbit,
     surface,
     texture,
@@ -234,6 +235,25 @@ def test_points_are_projected_as_by_a_pinhole(
             expected = projected(centre, camera, *size)
             np.testing.assert_allclose(found, expected, atol=0.15)
         assert not stage.radiance().any()
+
+
+@pytest.mark.parametrize("size", [(60, 40), (30, 50)])
+@pytest.mark.parametrize(("azimuth", "elevation"), [*ORBITS, (30.0, 90.0), (70.0, -90.0)])
+def test_the_fitting_distance_puts_the_outermost_point_on_the_edge(
+    azimuth: float, elevation: float, size: tuple[int, int]
+) -> None:
+    points = np.random.default_rng(9).normal(size=(40, 3)) * [3, 1, 0.3]
+    target, lens = (0.5, -1.0, 2.0), 35.0
+    distance = fitting_distance(
+        points, target, azimuth, elevation, view_angle=lens, aspect=size[0] / size[1]
+    )
+    camera = orbit(target, distance, azimuth, elevation, view_angle=lens)
+    forward = unit(np.subtract(camera.target, camera.position))
+    places = np.array([projected(point, camera, *size) for point in points]) / size
+    assert ((points - camera.position) @ forward > 0).all()
+    assert places.min() > -1e-9
+    assert places.max() < 1 + 1e-9
+    assert min(places.min(), 1 - places.max()) == pytest.approx(0, abs=1e-9)
 
 
 def test_straight_down_y_is_up_and_x_to_the_right() -> None:

@@ -65,6 +65,7 @@ def test_hard_names(name: str) -> None:
     assert _SLUG.fullmatch(found)
     if not _SLUG.fullmatch(name):
         assert re.search(r"(^|-)[0-9a-f]{8}$", found), "expected digits of the name's hash"
+        assert not found.startswith("-"), "a command would take it for an option"
 
 
 def test_hard_names_stay_apart() -> None:

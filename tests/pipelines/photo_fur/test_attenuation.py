@@ -92,6 +92,13 @@ def test_an_8_bit_grey_photograph_fills_its_own_bins(codes: list[int]) -> None:
     np.testing.assert_array_equal(histogram.counts, np.bincount(codes, minlength=256))
 
 
+@pytest.mark.parametrize("beside", [-0.45, 0.45])
+def test_the_bins_lie_about_their_codes(beside: float) -> None:
+    codes = np.arange(1, 255)
+    luminance = np.array([linear_of_code(code + beside) for code in codes])
+    np.testing.assert_array_equal(luminance_histogram(luminance).counts[1:255], 1)
+
+
 @settings(deadline=None)
 @given(st.lists(st.floats(0.0, 1.0, width=32), min_size=1, max_size=200))
 def test_the_histogram_counts_what_lies_between_its_edges(luminances: list[float]) -> None:

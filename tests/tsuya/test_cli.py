@@ -1,0 +1,242 @@
+"""The command line as a person meets it: output, exit codes, JSON, a killed run."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from assets_defs.workspace import Workspace
+from tsuya.cli import main
+from tsuya.gallery import write_gallery
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A Dagster home and a data folder that belong to this module."""
+    root = tmp_path_factory.mktemp("home")
+    (root / "dagster").mkdir()
+    (root / "dagster" / "dagster.yaml").write_text("telemetry: {enabled: false}\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DAGSTER_HOME", str(root / "dagster"))
+        patch.setenv("TSUYA_DATA", str(root / "data"))
+        yield root
+
+
+def tsuya(*arguments: str) -> Result:
+    return CliRunner().invoke(main, arguments)
+
+
+@pytest.fixture(scope="module")
+def made(home: Path) -> dict[str, Any]:
+    """What one small run says."""
+    result = tsuya(
+        *("run", "photo_fur", "--photo", "grass", "--mesh", "square"),
+        *("--preset", "test", "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    return dict(json.loads(result.stdout.splitlines()[-1]))
+
+
+def test_a_run_reports_figures_sizes_and_versions(made: dict[str, Any], home: Path) -> None:
+    assets = {asset["key"]: asset for asset in made["assets"]}
+    assert set(assets) == {
+        "photo_fur/fur_photo/grass",
+        "photo_fur/attenuation/grass",
+        "photo_fur/shell_stack/grass",
+        "photo_fur/shell_mesh/square",
+        "photo_fur/fur_frames/square.grass",
+    }
+    frames = assets["photo_fur/fur_frames/square.grass"]
+    assert frames["figures"]["top_view_rmse"] <= 0.02
+    folder = Path(tsuya("path", "photo_fur/fur_frames/square.grass").stdout.strip())
+    assert folder.name == frames["version"]
+    assert frames["bytes"] == sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
+    assert 0 < sum(asset["seconds"] for asset in assets.values()) <= made["seconds"]
+
+
+def test_a_second_run_says_in_a_table_that_all_is_current(made: dict[str, Any]) -> None:
+    result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square")
+    assert result.exit_code == 0
+    assert "0 made, 5 current already" in result.stdout
+    assert "top_view_rmse" in result.stdout
+
+
+def test_the_users_photograph_and_mesh_are_taken_in(
+    made: dict[str, Any], home: Path, tmp_path: Path
+) -> None:
+    noise = np.random.default_rng(5).integers(0, 65536, (70, 90), dtype=np.uint16)
+    Image.fromarray(noise).save(tmp_path / "deep.png")
+    (tmp_path / "tent.obj").write_text(
+        "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    )
+    result = tsuya(
+        *("run", "photo_fur", "--photo", str(tmp_path / "deep.png")),
+        *("--mesh", str(tmp_path / "tent.obj"), "--preset", "test"),
+        *("--set", "thickness=0.1", "--set", "layers=6", "--set", "crop=[5, 2, 66, 64]", "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    assets = {a["key"]: a for a in json.loads(result.stdout.splitlines()[-1])["assets"]}
+    assert assets["photo_fur/shell_mesh/tent-obj"]["settings"]["thickness"] == 0.1
+    store = Workspace(home / "data").store
+    slots = {str(slot): slot for slot in store.slots()}
+    photo = store.open(slots["photo_fur/fur_photo/deep-png"])
+    assert photo.attrs["name"] == "deep.png"
+    assert dict(photo.sizes) == {"y": 64, "x": 66, "channel": 3}
+    # 16 bits are kept: more luminances than 8 bits can tell apart.
+    assert len(np.unique(photo["luminance"].values)) > 1000
+    assert store.open(slots["photo_fur/shell_mesh/tent-obj"]).sizes["shell"] == 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--photo", "nobody.png"), "nobody.png"),
+        (("--photo", "grass", "--mesh", "square", "--set", "layers=0"), "layers"),
+        (("--photo", "grass", "--mesh", "square", "--set", "layers=1000"), "layers"),
+        (("--photo", "grass", "--mesh", "square", "--set", "thickness=-1"), "thickness"),
+        (("--photo", "grass", "--mesh", "square", "--set", "colour=red"), "colour"),
+        (("--photo", "grass", "--mesh", "square", "--set", "nothing"), "FIELD=VALUE"),
+    ],
+)
+def test_what_cannot_be_used_is_one_sentence_and_exit_code_2(
+    made: dict[str, Any], home: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    before = _files(home / "data")
+    result = tsuya("run", "photo_fur", *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert _files(home / "data") == before
+
+
+def test_bad_files_are_refused_and_leave_nothing(
+    made: dict[str, Any], home: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    (tmp_path / "points.ply").write_text("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n")
+    before = _files(home / "data")
+    for option, name in (("--photo", "cut.png"), ("--mesh", "points.ply")):
+        result = tsuya("run", "photo_fur", option, str(tmp_path / name))
+        assert result.exit_code == 2
+        assert name in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1
+    assert _files(home / "data") == before
+
+
+def test_status_path_and_rollback(made: dict[str, Any], home: Path) -> None:
+    assert "photo_fur/attenuation/grass" in tsuya("status").stdout
+    before = json.loads(tsuya("status", "--json").stdout)["assets"]
+    key = "photo_fur/attenuation/grass"
+    version = next(asset["version"] for asset in before if asset["key"] == key)
+    small = ("run", "photo_fur", "--photo", "grass", "--mesh", "square")
+    assert tsuya(*small, "--set", "layers=7").exit_code == 0
+    assert not tsuya("path", key).stdout.strip().endswith(version)
+    result = tsuya("rollback", key)
+    assert result.stdout.strip() == version
+    assert tsuya("path", key).stdout.strip().endswith(version)
+    result = tsuya("path", "photo_fur/nothing/grass")
+    assert result.exit_code == 2
+    result = tsuya("path", "photo_fur/fur_photo/nobody")
+    assert result.exit_code == 2
+    assert "Materialise" in result.stderr
+
+
+def test_a_failing_check_is_exit_code_1(
+    made: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.photo_fur import photograph
+
+    monkeypatch.setattr(photograph, "expose", lambda radiance: radiance * 0.02 + 0.5)
+    result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square", "--force")
+    assert result.exit_code == 1
+    assert "contrast" in result.stderr
+    assert len(result.stderr.strip().splitlines()[-1]) < 300
+
+
+def test_the_gallery_writes_a_png_for_every_picture(
+    made: dict[str, Any], home: Path, tmp_path: Path
+) -> None:
+    store = Workspace(home / "data").store
+    slots = [slot for slot in store.slots() if slot.partition in ("grass", "square.grass")]
+    names = {path.name for path in write_gallery(store, slots, tmp_path)}
+    assert names == {
+        "fur_photo-grass-photograph.png",
+        "attenuation-grass-decay.png",
+        "shell_stack-grass-layers.png",
+        "fur_frames-square.grass-frames.png",
+    }
+    for path in (tmp_path / "photo_fur").iterdir():
+        assert Image.open(path).size[0] >= 96
+
+
+def test_the_doctor_finds_this_machine_well_and_draws(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tsuya.cli.PICTURES", tmp_path)
+    result = tsuya("doctor")
+    assert result.exit_code == 0, result.stdout
+    assert all(line.startswith("ok") for line in result.stdout.splitlines())
+    assert Image.open(tmp_path / "doctor.png").size == (320, 240)
+
+
+def test_a_checkout_that_is_not_set_up_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tsuya.session.CHECKOUT", tmp_path)
+    monkeypatch.delenv("DAGSTER_HOME", raising=False)
+    result = tsuya("run", "photo_fur")
+    assert result.exit_code == 2
+    assert "make setup" in result.stderr
+
+
+def test_a_run_killed_at_any_time_loses_nothing(made: dict[str, Any], home: Path) -> None:
+    """`kill -9` while all is made again in another size; then all is still there, and goes on."""
+    workspace = Workspace(home / "data")
+    store = workspace.store
+    slots = [
+        slot for slot in store.slots() if slot.partition in ("grass", "square", "square.grass")
+    ]
+    command = [str(Path(sys.executable).parent / "tsuya"), "run", "photo_fur"]
+    command += ["--photo", "grass", "--mesh", "square", "--force"]
+    chance = random.Random(3)
+    for number in range(4):
+        before = {slot: store.current(slot) for slot in slots}
+        command_now = [*command, "--set", f"largest_side={100 + number}"]
+        process = subprocess.Popen(
+            command_now, env=os.environ, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        time.sleep(chance.uniform(1.5, 6.0))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        for slot in slots:
+            current = store.current(slot)
+            assert current >= before[slot]
+            store.open(slot).load()
+            record = store.record(slot)
+            verdicts = store.verdicts(slot, current)
+            assert all(verdicts[check]["passed"] for check in record["checks"])
+    result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square", "--preset", "test")
+    assert result.exit_code == 0
+    widths = {store.open(slot).sizes["x"] for slot in slots if slot.asset == "fur_photo"}
+    assert widths == {128}
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "lock"
+    }
