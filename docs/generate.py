@@ -26,7 +26,7 @@ def asset_page() -> str:
                 "",
                 plan.schema.meaning,
                 "",
-                f"One a {' x '.join(plan.by)}; made from {inputs}; schema {plan.schema.number}.",
+                f"One for each {' and '.join(plan.by)}; made from {inputs}; schema {plan.schema.number}.",
                 "",
                 plan.schema.markdown(),
                 "",

@@ -8,8 +8,8 @@ picture. The brightness never sees the depth: it is what a Monte Carlo light tra
 
 Place and units
     The patch is the tile [0, 1] x [0, 1] of the plane z = 0 (the skin), continued periodically in
-    x and y; z points to the camera. One unit is the side of the tile (``hairs.py``). Row 0 of a picture is at
-    y = 1, column 0 at x = 0.
+    x and y; z points to the camera. One unit is the side of the tile (see ``hairs.py``). Row 0 of
+    a picture is at y = 1, column 0 at x = 0.
 
 Light
     A large soft source overhead: radiance from the direction with zenith angle t is

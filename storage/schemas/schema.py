@@ -75,7 +75,7 @@ class Schema:
         for name, variable in self.variables.items():
             note = f" ({variable.source})" if variable.source else ""
             only = " *(where known)*" if variable.optional else ""
-            dims = " x ".join(variable.dims) or "scalar"
+            dims = ", ".join(variable.dims) or "scalar"
             rows.append(
                 f"| `{name}` | {dims} | {variable.dtype} | {variable.units} "
                 f"| {variable.meaning}{note}{only} |"

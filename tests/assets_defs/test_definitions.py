@@ -239,3 +239,10 @@ def test_a_dropped_file_that_is_no_photograph_fails_with_its_sentence(make_house
     failure = next(event for event in done.all_events if event.is_step_failure)
     assert "broken.png" in str(failure.step_failure_data.error)
     assert list(house.workspace.store.slots()) == []
+
+
+def test_the_asset_page_is_up_to_date() -> None:
+    """`make docs` makes it; the schemas and checks are the truth."""
+    from docs.generate import PAGE, asset_page
+
+    assert PAGE.read_text() == asset_page()
