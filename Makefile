@@ -37,8 +37,9 @@ lint: setup      ## ruff and mypy
 	@$(VENV)/ruff format --check .
 	@$(VENV)/mypy
 
-docs: setup      ## docs/assets.md from the schemas
-	@$(VENV)/python -m docs.generate
+docs: setup demo ## docs/assets.md from the schemas, docs/pictures/ from the demo
+	@$(VENV)/python -m docs.assets
+	@$(VENV)/python -m docs.pictures
 
 doctor: setup    ## check this machine and draw one picture
 	@$(VENV)/tsuya doctor

@@ -77,13 +77,13 @@ def fit_attenuation(luminance: NDArray[np.floating], *, tail: float) -> Attenuat
     if not 0.0 <= tail < 0.5:
         raise ValueError(f"tail is {tail}; expected a share in [0, 0.5).")
     histogram = luminance_histogram(luminance)
-    places = np.searchsorted(histogram.edges, luminance, side="right") - 1
     allowed = tail * luminance.size
     below = np.cumsum(histogram.counts)
-    above = np.cumsum(histogram.counts[::-1])[::-1]
-    first = int(np.argmax(below > allowed))
-    last = 255 - int(np.argmax(above[::-1] > allowed))
-    kept = luminance[(places >= first) & (places <= last) & (luminance > 0)]
+    above = np.cumsum(histogram.counts[::-1])
+    darkest_edge = histogram.edges[int(np.argmax(below > allowed))]
+    brightest_edge = histogram.edges[256 - int(np.argmax(above > allowed))]
+    inside = (luminance >= darkest_edge) & (luminance < brightest_edge) & (luminance > 0)
+    kept = luminance[inside]
     if kept.size == 0 or kept.min() == kept.max():
         raise ValueError(
             f"the photograph has a single luminance inside its tails of {tail:g}; "

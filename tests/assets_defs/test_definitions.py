@@ -243,6 +243,6 @@ def test_a_dropped_file_that_is_no_photograph_fails_with_its_sentence(make_house
 
 def test_the_asset_page_is_up_to_date() -> None:
     """`make docs` makes it; the schemas and checks are the truth."""
-    from docs.generate import PAGE, asset_page
+    from docs.assets import PAGE, asset_page
 
     assert PAGE.read_text() == asset_page()

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import dagster as dg
 import pytest
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, field_validator
 
 from assets_defs.definitions import SYSTEMS
 from assets_defs.settings import PRESETS, Preset, Settings, SettingsError, config_class, resolve
@@ -25,6 +25,13 @@ class Sample(Settings):
     angles: tuple[float, ...] = (0.0, 90.0)
     wet: bool = False
     name: str = "fur"
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_slug(cls, name: str) -> str:
+        if " " in name:
+            raise ValueError("Expected no space")
+        return name
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"count": 4},
@@ -125,6 +132,7 @@ def test_an_unknown_preset_is_refused(preset: str) -> None:
         ({"kind": "wet"}, "setting 'kind' is 'wet'; ", "'round' or 'flat'."),
         ({"crop": [1, "x"]}, "setting 'crop.1' is 'x'; ", "."),
         ({"crop": [1]}, "setting 'crop", "."),
+        ({"name": "a b"}, "setting 'name' is 'a b'; expected no space", "no space."),
         ({"colour": 3}, "setting 'colour' is 3; ", "not permitted."),
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",

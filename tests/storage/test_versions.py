@@ -399,6 +399,16 @@ def test_every_order_of_verdicts_on_three_candidates(tmp_path: Path, slot: Slot)
             assert pointer.candidates == waiting
 
 
+def test_an_older_version_that_passes_late_takes_no_newer_one_s_place(
+    tmp_path: Path, slot: Slot
+) -> None:
+    store = VersionedStore(tmp_path, keep=2)
+    late = _write(store, slot, 0, "sharp")
+    before, current = (_write(store, slot, value) for value in (1, 2))
+    store.pass_version(slot, late, "sharp", 1.0)
+    assert store.pointer(slot) == Pointer(current, "recipe of 2", (before,), ())
+
+
 def test_a_check_is_about_the_version_of_its_run(store: VersionedStore, slot: Slot) -> None:
     good = _write(store, slot, 0, run="first")
     second, third = (
@@ -537,7 +547,7 @@ def test_collecting_where_nothing_is(store: VersionedStore, slot: Slot) -> None:
 # ---- all together ----------------------------------------------------------------------------
 
 CHECKS = ("sharp", "bright")
-KEEP = 2
+KEEP = 3
 SLOT = Slot("system", "asset", "key")
 
 
@@ -547,6 +557,7 @@ class _Known(NamedTuple):
     value: int
     size: int
     checks: tuple[str, ...]
+    recipe: str
     files: dict[str, str]
 
 
@@ -571,6 +582,9 @@ class StoreMachine(RuleBasedStateMachine):
         self.good: set[str] = set()
         self.waiting: set[str] = set()
         self.verdicts: dict[tuple[str, str], bool] = {}
+        self.writes = 0
+        self.last_current: str | None = None
+        self.recipe: str | None = None
 
     def teardown(self) -> None:
         """Whatever happened, no published byte has changed. Leave nothing on disk."""
@@ -603,17 +617,20 @@ class StoreMachine(RuleBasedStateMachine):
     def write(self, value: int, size: int, count: int) -> None:
         """Write, with none, one or two checks to wait for."""
         checks = CHECKS[:count]
-        record = {"settings": {"size": size}, "recipe": f"{value} {size}", "checks": checks}
+        self.writes += 1
+        recipe = f"recipe {self.writes}"
+        record = {"settings": {"size": size}, "recipe": recipe, "checks": checks}
         written = self.store.write(SLOT, _holding(value), record)
         now = self.current and self.known[self.current]
         assert written.is_new == (not now or (now.value, now.size) != (value, size))
         if not written.is_new:
             assert written.version == self.current
+            self.recipe = recipe
         else:
             version = written.version
             assert version > max(self.known, default=""), "versions sort by the time of writing"
             files = _hashes(self.store.folder(SLOT, version))
-            self.known[version] = _Known(value, size, checks, files)
+            self.known[version] = _Known(value, size, checks, recipe, files)
             self.there.add(version)
             self.waiting.add(version)
             self.promote_if_passed(version)
@@ -678,7 +695,7 @@ class StoreMachine(RuleBasedStateMachine):
 
     @invariant()
     def the_store_is_as_the_model_says(self) -> None:
-        """Pointer, folders, verdicts, and the current value."""
+        """Pointer, folders, verdicts, the current value and recipe."""
         if not hasattr(self, "store"):
             return
         pointer = self.store.pointer(SLOT)
@@ -691,15 +708,18 @@ class StoreMachine(RuleBasedStateMachine):
             expected = {c: p for (v, c), p in self.verdicts.items() if v == version}
             verdicts = self.store.verdicts(SLOT, version)
             assert {check: verdict["passed"] for check, verdict in verdicts.items()} == expected
+        if self.current != self.last_current:
+            self.last_current = self.current
+            self.recipe = self.known[self.current].recipe if self.current else None
+        assert pointer.recipe == self.recipe
         if self.current:
             known = self.known[self.current]
-            assert pointer.recipe == f"{known.value} {known.size}"
             assert _value(self.store, SLOT) == known.value
             assert all(self.verdicts.get((self.current, check)) for check in known.checks)
 
 
 StoreMachine.TestCase.settings = settings(
-    max_examples=15,
+    max_examples=20,
     stateful_step_count=30,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],

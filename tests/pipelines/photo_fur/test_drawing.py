@@ -87,6 +87,7 @@ def fur(
     wrap: Wrap = "mirrored",
     lit: bool = False,
     repeats: float = 1.0,
+    interpolate: bool = False,
     only: int | None = None,
 ) -> Any:
     """The fur of the flat skin; with ``only``, every other layer is far outside the picture."""
@@ -104,7 +105,7 @@ def fur(
         photo.medium,
         fill=fill,
         wrap=wrap,
-        interpolate=False,
+        interpolate=interpolate,
         lit=lit,
     )
 
@@ -158,6 +159,17 @@ def test_dropped_tails_show_the_background_exactly_there(layers: int, fill: Fill
     np.testing.assert_array_equal(picture[dropped][:, :3], np.tile(RED, (dropped.sum(), 1)))
     shown = to_8bit(picture[..., :3])
     np.testing.assert_array_equal(shown[~dropped], to_8bit(photo.radiance)[~dropped])
+
+
+def test_enlarged_fur_shows_its_texels_or_what_lies_between_them() -> None:
+    photo = random_photograph(16, (6, 6))
+    sharp = drawn(fur(photo, 4, fill="columns"), size=30)[..., :3]
+    expected = photo.radiance.repeat(5, axis=0).repeat(5, axis=1)
+    np.testing.assert_array_equal(to_8bit(sharp), to_8bit(expected))
+    smooth = drawn(fur(photo, 1, fill="columns", interpolate=True), size=30)[..., :3]
+    np.testing.assert_allclose(smooth[2::5, 2::5], sharp[2::5, 2::5], atol=6e-3)
+    between = (0.6 * sharp[2, 2] + 0.4 * sharp[2, 7], 0.4 * sharp[2, 2] + 0.6 * sharp[2, 7])
+    np.testing.assert_allclose(smooth[2, 4:6], between, atol=6e-3)
 
 
 def test_lit_fur_is_lambertian() -> None:
@@ -348,6 +360,14 @@ def test_the_square_is_shown_from_above_and_from_the_side(shape: tuple[int, int]
     assert heard == [0.0, 0.5]
 
 
+def test_where_the_texture_coordinates_go_on_the_photograph_is_mirrored() -> None:
+    photo, skin = random_photograph(17), flat_skin()
+    twice = skin._replace(uvs=2 * skin.uvs)
+    picture = frames_of(photo, twice, SQUARE_VIEWS[:1], size=(2 * SIZE, 2 * SIZE)).pictures[0]
+    expected = np.pad(photo.radiance, ((SIZE, 0), (0, SIZE), (0, 0)), mode="symmetric")
+    np.testing.assert_array_equal(picture, to_8bit(expected))
+
+
 def test_coverage_is_the_share_of_pixels_that_are_not_background() -> None:
     photo = random_photograph(13)
     views = (SQUARE_VIEWS[0], *ROUND_VIEWS)
@@ -384,6 +404,7 @@ def test_round_views_show_the_four_sides_whole_and_in_their_order() -> None:
     grey = luminance(radiance)
     photo = Photograph(radiance, grey, fit_attenuation(grey, tail=0.0))
     frames = frames_of(photo, sphere(), ROUND_VIEWS, size=(60, 60), thickness=0.05)
+    assert [view.azimuth for view in ROUND_VIEWS] == [-90, 0, 90, 180]
     for view, picture in zip(ROUND_VIEWS, frames.pictures, strict=True):
         middle = picture[28:32, 28:32].reshape(-1, 3).mean(axis=0)
         expected = to_8bit(colours[round(view.azimuth / 90) % 4]).astype(float)

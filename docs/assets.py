@@ -26,7 +26,8 @@ def asset_page() -> str:
                 "",
                 plan.schema.meaning,
                 "",
-                f"One for each {' and '.join(plan.by)}; made from {inputs}; schema {plan.schema.number}.",
+                f"One for each {' and '.join(plan.by)}; made from {inputs}; "
+                f"schema {plan.schema.number}.",
                 "",
                 plan.schema.markdown(),
                 "",

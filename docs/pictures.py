@@ -1,0 +1,64 @@
+"""Make docs/pictures/ from the demo's current assets: ``make docs``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from assets_defs.photo_fur import FUR
+from assets_defs.workspace import Workspace
+from storage.versions import VersionedStore
+
+FOLDER = Path(__file__).parent / "pictures"
+_HEIGHT = 400
+_GAP = 10
+
+
+def make_pictures(store: VersionedStore) -> None:
+    """Write every picture that the pages show."""
+    frames = {name: _frames(store, "teapot-large", name) for name in ("grass", "chelsea", "pelt")}
+    _row(
+        "fur.jpg",
+        _shown(store, "fur_photo", {"photo": "pelt"}),
+        _shown(store, "shell_stack", {"photo": "pelt"}),
+        frames["pelt"][0],
+    )
+    _row("fur-square.jpg", *_frames(store, "square", "pelt"))
+    _row("fur-three.jpg", *(pictures[0] for pictures in frames.values()))
+    _row("fur-decay.png", _shown(store, "attenuation", {"photo": "pelt"}))
+
+
+def _frames(store: VersionedStore, mesh: str, photo: str) -> NDArray[np.uint8]:
+    frames = store.open(FUR.slot("fur_frames", {"mesh": mesh, "photo": photo}))["frames"]
+    return np.asarray(frames.values)
+
+
+def _shown(store: VersionedStore, asset: str, keys: dict[str, str]) -> NDArray[np.uint8]:
+    pictures = FUR.plans[asset].pictures
+    assert pictures is not None
+    (picture,) = pictures(store.open(FUR.slot(asset, keys))).values()
+    return picture
+
+
+def _row(name: str, *pictures: NDArray[np.uint8]) -> None:
+    """Pictures side by side, equally high, on white."""
+    scaled = []
+    for picture in pictures:
+        image = Image.fromarray(picture)
+        width = round(image.width * _HEIGHT / image.height)
+        scaled.append(image.resize((width, _HEIGHT), Image.Resampling.LANCZOS))
+    width = sum(image.width for image in scaled) + _GAP * (len(scaled) - 1)
+    row = Image.new("RGB", (width, _HEIGHT), "white")
+    left = 0
+    for image in scaled:
+        row.paste(image, (left, 0))
+        left += image.width + _GAP
+    FOLDER.mkdir(exist_ok=True)
+    row.save(FOLDER / name, quality=88, optimize=True)
+
+
+if __name__ == "__main__":
+    make_pictures(Workspace.from_environment().store)
