@@ -10,6 +10,7 @@ import shutil
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import dagster as dg
 
@@ -70,12 +71,13 @@ def take_in(
     path: Path,
     system: System,
     dimension: Dimension,
+    given: Mapping[str, Any],
     workspace: Workspace,
     instance: dg.DagsterInstance,
 ) -> str:
     """Read a file, copy it into the inbox and register it; returns its key.
 
-    A file of a name that is taken by other content gets digits of its hash. Raises ValueError
+    ``given`` are the settings that it is to be used with (a crop, say). A file of a name that is taken by other content gets digits of its hash. Raises ValueError
     for a file that cannot be used; then nothing is copied.
     """
     if path.suffix.lower() not in dimension.suffixes:
@@ -83,7 +85,7 @@ def take_in(
             f"{path.name}: ending is {path.suffix!r}; expected one of "
             f"{', '.join(dimension.suffixes)}."
         )
-    dimension.read(path)
+    dimension.check(Source.of(path), given)
     inbox = workspace.inbox(system.name)
     fingerprint = Source.of(path).fingerprint
     for name in (path.name, f"{path.stem}-{fingerprint[:8]}{path.suffix}"):

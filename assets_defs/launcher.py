@@ -88,9 +88,6 @@ class Launcher:
                         f"{dimension.name} {key!r} is not known; "
                         f"expected one of {', '.join(sources)}."
                     )
-                path = sources[key].path
-                if path is not None:
-                    dimension.read(path)
         fields = {name for plan in system.plans.values() for name in plan.settings.model_fields}
         for name in request.given:
             if name not in fields:
@@ -102,7 +99,10 @@ class Launcher:
         ]
         for by, keys in planned:
             for plan in self._grain_plans(system, by):
-                self._settings(request, plan, keys)
+                settings = self._settings(request, plan, keys)
+                source = system.source_of(plan, keys, self.workspace.inbox(system.name))
+                if source is not None:
+                    system.dimension(*by).check(source, settings.model_dump())
         return planned
 
     def _run_grain(

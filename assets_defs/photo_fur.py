@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import Field
 
@@ -30,6 +30,19 @@ Pictures = dict[str, "NDArray[np.uint8]"]
 Result = tuple["xr.Dataset", Metadata]
 Layers = Annotated[int, Field(ge=1, le=MOST_LAYERS, description="Layers of shells, N")]
 
+
+def _check_photograph(source: Source, settings: Mapping[str, Any]) -> None:
+    if source.path is not None:
+        read_photograph(source.path, settings.get("crop"))
+    elif settings.get("crop") is not None:
+        raise ValueError(f"crop is set for {source.name}; expected a photograph of yours.")
+
+
+def _check_mesh(source: Source, settings: Mapping[str, Any]) -> None:
+    if source.path is not None:
+        read_mesh(source.path)
+
+
 FUR = System(
     name="photo_fur",
     title="Fur from one photograph",
@@ -37,16 +50,18 @@ FUR = System(
         Dimension(
             "photo",
             builtin=(*BUILTIN_PHOTOGRAPHS, PELT),
+            examples=("grass", "chelsea", PELT),
             default=PELT,
             suffixes=(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr"),
-            read=read_photograph,
+            check=_check_photograph,
         ),
         Dimension(
             "mesh",
-            builtin=(SQUARE, "teapot", "teapot-large"),
+            builtin=(SQUARE, "sphere", "teapot", "teapot-large"),
+            examples=(SQUARE, "teapot", "teapot-large"),
             default="teapot",
             suffixes=(".ply", ".obj", ".glb"),
-            read=read_mesh,
+            check=_check_mesh,
         ),
     ),
 )
@@ -456,6 +471,7 @@ def shell_mesh(settings: MeshSettings, source: Source) -> Result:
     else:
         mesh = {
             SQUARE: lambda: geometry.square(32),
+            "sphere": lambda: geometry.sphere(64),
             "teapot": lambda: geometry.teapot(8),
             "teapot-large": lambda: geometry.teapot(33),
         }[source.key]()

@@ -46,21 +46,6 @@ OWNERS = ("team:tsuya",)
 
 
 @dataclass(frozen=True)
-class Dimension:
-    """What a system's assets are partitioned by: its photographs, its meshes …"""
-
-    name: str
-    builtin: tuple[str, ...]
-    """Keys that need no file."""
-    default: str
-    """What a dropped item of another dimension is combined with."""
-    suffixes: tuple[str, ...]
-    """Endings of this dimension's files in the inbox, lower case."""
-    read: Callable[[Path], object]
-    """Reads a file; raises ValueError for one that cannot be used."""
-
-
-@dataclass(frozen=True)
 class Source:
     """What a partition's first asset is made from: a user's file, or something built in."""
 
@@ -84,6 +69,23 @@ class Source:
             return f"built-in:{self.key}"
         with self.path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """What a system's assets are partitioned by: its photographs, its meshes …"""
+
+    name: str
+    builtin: tuple[str, ...]
+    """Keys that need no file."""
+    examples: tuple[str, ...]
+    """The built-in ones that the demo shows, and that are made where nothing is asked for."""
+    default: str
+    """What a dropped item of another dimension is combined with."""
+    suffixes: tuple[str, ...]
+    """Endings of this dimension's files in the inbox, lower case."""
+    check: Callable[[Source, Mapping[str, Any]], object]
+    """Raises ValueError for a source that cannot be used with these settings of its asset."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,10 @@ class System:
                 by = sorted(self.plans[slot.asset].by)
                 found.append(dict(zip(by, slot.partition.split("."), strict=True)))
         return found
+
+    def examples(self) -> list[dict[str, str]]:
+        """The partitions that the demo shows."""
+        return self.span({dimension.name: dimension.examples for dimension in self.dimensions})
 
     def slot(self, asset: str, keys: Mapping[str, str]) -> Slot:
         """Where an asset's partition is stored; several keys are joined in the order of names."""

@@ -20,7 +20,7 @@ from assets_defs.definitions import SYSTEMS
 from assets_defs.inbox import take_in
 from assets_defs.launcher import LaunchError, Outcome, Request
 from assets_defs.settings import PRESETS
-from assets_defs.system import System
+from assets_defs.system import Dimension, System
 from assets_defs.workspace import CHECKOUT, Workspace
 from storage.errors import StoreError
 from tsuya.doctor import examine
@@ -81,14 +81,15 @@ def _run_command(system: System) -> click.Command:
         console = Console(stderr=True)
         with open_session(console) as session:
             started = time.perf_counter()
+            given = _fields(settings)
             chosen = {
                 dimension.name: [
-                    _key(item, system, dimension.name, session)
-                    for item in items[dimension.name] or dimension.builtin
+                    _key(item, system, dimension, given, session)
+                    for item in items[dimension.name] or dimension.examples
                 ]
                 for dimension in system.dimensions
             }
-            request = Request(system, system.span(chosen), preset, _fields(settings), force)
+            request = Request(system, system.span(chosen), preset, given, force)
             outcomes = session.launcher.launch(request)
             seconds = time.perf_counter() - started
         _report(session, outcomes, seconds, as_json)
@@ -98,7 +99,7 @@ def _run_command(system: System) -> click.Command:
             [f"--{dimension.name}"],
             multiple=True,
             help=f"A file ({', '.join(dimension.suffixes)}) or one of "
-            f"{', '.join(dimension.builtin)}; may be repeated. Default: all built-in ones.",
+            f"{', '.join(dimension.builtin)}; may be repeated. Default: {', '.join(dimension.examples)}.",
         )
         for dimension in system.dimensions
     ]
@@ -136,10 +137,7 @@ def demo(as_json: bool) -> None:
     outcomes: list[Outcome] = []
     with open_session(console) as session:
         for system in SYSTEMS.values():
-            everything = {
-                dimension.name: list(dimension.builtin) for dimension in system.dimensions
-            }
-            request = Request(system, system.span(everything), preset="demo")
+            request = Request(system, system.examples(), preset="demo")
             outcomes += session.launcher.launch(request)
     seconds = time.perf_counter() - started
     written = write_gallery(session.workspace.store, [each.slot for each in outcomes], PICTURES)
@@ -204,17 +202,18 @@ def _workspace() -> Workspace:
     return Workspace.from_environment()
 
 
-def _key(item: str, system: System, dimension: str, session: Session) -> str:
+def _key(
+    item: str, system: System, dimension: Dimension, given: Mapping[str, Any], session: Session
+) -> str:
     """The key of a built-in or registered item; a file is taken into the inbox."""
-    inbox = session.workspace.inbox(system.name)
-    if item in system.sources(dimension, inbox):
+    known = system.sources(dimension.name, session.workspace.inbox(system.name))
+    if item in known:
         return item
     if not Path(item).exists():
-        known = ", ".join(system.sources(dimension, inbox))
-        raise ValueError(f"{item}: no such {dimension}; expected a file or one of {known}.")
-    return take_in(
-        Path(item), system, system.dimension(dimension), session.workspace, session.instance
-    )
+        raise ValueError(
+            f"{item}: no such {dimension.name}; expected a file or one of {', '.join(known)}."
+        )
+    return take_in(Path(item), system, dimension, given, session.workspace, session.instance)
 
 
 def _fields(settings: Sequence[str]) -> Mapping[str, Any]:

@@ -39,6 +39,12 @@ def test_bad_settings_are_refused_before_any_work(
     assert house.instance.get_runs_count() == 0
 
 
+def test_a_crop_is_for_photographs_of_files(house: Any) -> None:
+    given = {"crop": [0, 0, 64, 64]}
+    with pytest.raises(ValueError, match="crop is set for grass"):
+        house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test", given))
+
+
 def test_an_unknown_key_is_refused(house: Any) -> None:
     with pytest.raises(ValueError, match="photo 'nobody' is not known"):
         house.launcher.launch(Request(FUR, [{"photo": "nobody"}]))
@@ -48,7 +54,7 @@ def test_a_bad_photograph_is_refused_and_not_taken_in(house: Any, tmp_path: Path
     path = tmp_path / "flat.png"
     Image.fromarray(np.full((80, 80, 3), 90, np.uint8)).save(path)
     with pytest.raises(ValueError, match=r"flat\.png"):
-        take_in(path, FUR, FUR.dimension("photo"), house.workspace, house.instance)
+        take_in(path, FUR, FUR.dimension("photo"), {}, house.workspace, house.instance)
     assert FUR.files("photo", house.workspace.inbox("photo_fur")) == []
 
 
@@ -61,11 +67,11 @@ def test_a_photograph_is_taken_in_once_and_apart_from_others_of_its_name(
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / "Fell, grün.png"
         Image.fromarray(picture).save(path)
-        keys.append(take_in(path, FUR, FUR.dimension("photo"), house.workspace, house.instance))
+        keys.append(take_in(path, FUR, FUR.dimension("photo"), {}, house.workspace, house.instance))
     assert keys[0] == keys[1] != keys[2]
     path = tmp_path / "grass.png"
     Image.fromarray(noise).save(path)
-    built_in = take_in(path, FUR, FUR.dimension("photo"), house.workspace, house.instance)
+    built_in = take_in(path, FUR, FUR.dimension("photo"), {}, house.workspace, house.instance)
     assert built_in == "grass-png"
     outcomes = house.launcher.launch(Request(FUR, [{"photo": keys[0]}], "test"))
     assert [outcome.state for outcome in outcomes] == ["made"] * 3

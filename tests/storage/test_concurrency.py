@@ -57,7 +57,7 @@ def test_writers_of_different_partitions_do_not_meet(
 ) -> None:
     store = VersionedStore(tmp_path)
     jobs = [
-        writers.start("write_many", **_place(tmp_path, slot, first, 10))
+        writers.start("write_many", **_place(tmp_path, slot, first, 6))
         for slot, first in ((SLOT, 1), (OTHER, 101))
     ]
     reports = [job.finish() for job in jobs]
@@ -67,7 +67,7 @@ def test_writers_of_different_partitions_do_not_meet(
         pointer = store.pointer(slot)
         assert pointer.version is not None
         numbers = [intact_number(store, slot, name) for name in (pointer.version, *pointer.earlier)]
-        assert numbers == list(range(first + 9, first - 1, -1))
+        assert numbers == list(range(first + 5, first - 1, -1))
         assert pointer.candidates == ()
 
 
@@ -77,14 +77,14 @@ def test_writers_of_one_partition_lose_nothing(
 ) -> None:
     store = VersionedStore(tmp_path)
     jobs = [
-        writers.start("write_many", **_place(tmp_path, SLOT, first, 8, checks=checks))
+        writers.start("write_many", **_place(tmp_path, SLOT, first, 5, checks=checks))
         for first in (1, 101, 201)
     ]
     reports = [job.finish() for job in jobs]
     done = {
         event["version"]: event["done"] for report in reports for event in report if "done" in event
     }
-    assert sorted(done.values()) == [*range(1, 9), *range(101, 109), *range(201, 209)]
+    assert sorted(done.values()) == [*range(1, 6), *range(101, 106), *range(201, 206)]
     pointer = store.pointer(SLOT)
     assert pointer.version == max(done), "expected the version that was begun last"
     good = (max(done), *pointer.earlier)

@@ -177,7 +177,7 @@ def test_the_table_holds_every_variable(schema: Schema) -> None:
     assert [row[0] for row in cells] == [f"`{name}`" for name in schema.variables]
     for row, variable in zip(cells, schema.variables.values(), strict=True):
         assert len(row) == 5, "expected no bar in a cell: it would cut the table"
-        assert row[1] == (" x ".join(variable.dims) if variable.dims else "scalar")
+        assert row[1] == (", ".join(variable.dims) if variable.dims else "scalar")
         assert row[2:4] == [variable.dtype, variable.units]
         assert variable.meaning in row[4]
         assert variable.source in row[4]
