@@ -77,8 +77,9 @@ def take_in(
 ) -> str:
     """Read a file, copy it into the inbox and register it; returns its key.
 
-    ``given`` are the settings that it is to be used with (a crop, say). A file of a name that is taken by other content gets digits of its hash. Raises ValueError
-    for a file that cannot be used; then nothing is copied.
+    ``given`` are the settings that it is to be used with (a crop, say). A file of a name that is
+    taken by other content gets digits of its hash. Raises ValueError for a file that cannot be
+    used; then nothing is copied.
     """
     if path.suffix.lower() not in dimension.suffixes:
         raise ValueError(

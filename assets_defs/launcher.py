@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import dagster as dg
 
-from assets_defs.settings import Settings
+from assets_defs.settings import Settings, resolve
 from assets_defs.system import AssetPlan, Progress, System, partition_key, provenance
 from assets_defs.workspace import Workspace
 from storage.versions import Slot
@@ -88,12 +88,7 @@ class Launcher:
                         f"{dimension.name} {key!r} is not known; "
                         f"expected one of {', '.join(sources)}."
                     )
-        fields = {name for plan in system.plans.values() for name in plan.settings.model_fields}
-        for name in request.given:
-            if name not in fields:
-                raise ValueError(
-                    f"setting {name!r} is not known; expected one of {', '.join(sorted(fields))}."
-                )
+        check_settings(system, request.preset, request.given)
         planned = [
             (by, keys) for by in system.grains() for keys in _projections(request.partitions, by)
         ]
@@ -164,8 +159,7 @@ class Launcher:
         return [plan for plan in system.plans.values() if plan.by == by]
 
     def _settings(self, request: Request, plan: AssetPlan, keys: Mapping[str, str]) -> Settings:
-        fields = plan.settings.model_fields
-        given = {name: value for name, value in request.given.items() if name in fields}
+        given = _for_plan(plan, request.given)
         return request.system.resolve(
             plan.name, keys, self.workspace.store, preset=request.preset, given=given
         )
@@ -192,6 +186,25 @@ class Launcher:
         source = system.source_of(plan, keys, self.workspace.inbox(system.name))
         now = provenance(plan, settings, source.fingerprint if source else None, records)
         return bool(now["recipe"] == pointer.recipe)
+
+
+def check_settings(system: System, preset: str | None, given: Mapping[str, Any]) -> None:
+    """Raise ValueError unless every field exists and every value may be, for the default items."""
+    fields = {name for plan in system.plans.values() for name in plan.settings.model_fields}
+    for name in given:
+        if name not in fields:
+            raise ValueError(
+                f"setting {name!r} is not known; expected one of {', '.join(sorted(fields))}."
+            )
+    defaults = {dimension.name: dimension.default for dimension in system.dimensions}
+    for plan in system.plans.values():
+        chosen = _for_plan(plan, given)
+        resolve(plan.settings, plan.name, defaults, preset=preset, given=chosen, current=None)
+
+
+def _for_plan(plan: AssetPlan, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that an asset has a field for."""
+    return {name: value for name, value in given.items() if name in plan.settings.model_fields}
 
 
 def _keys(request: Request, dimension: str) -> list[str]:

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from assets_defs.definitions import SYSTEMS
 from assets_defs.inbox import take_in
-from assets_defs.launcher import LaunchError, Outcome, Request
+from assets_defs.launcher import LaunchError, Outcome, Request, check_settings
 from assets_defs.settings import PRESETS
 from assets_defs.system import Dimension, System
 from assets_defs.workspace import CHECKOUT, Workspace
@@ -82,6 +82,7 @@ def _run_command(system: System) -> click.Command:
         with open_session(console) as session:
             started = time.perf_counter()
             given = _fields(settings)
+            check_settings(system, preset, given)  # before a file is copied
             chosen = {
                 dimension.name: [
                     _key(item, system, dimension, given, session)
@@ -99,7 +100,8 @@ def _run_command(system: System) -> click.Command:
             [f"--{dimension.name}"],
             multiple=True,
             help=f"A file ({', '.join(dimension.suffixes)}) or one of "
-            f"{', '.join(dimension.builtin)}; may be repeated. Default: {', '.join(dimension.examples)}.",
+            f"{', '.join(dimension.builtin)}; may be repeated. "
+            f"Default: {', '.join(dimension.examples)}.",
         )
         for dimension in system.dimensions
     ]

@@ -105,17 +105,22 @@ def test_the_users_photograph_and_mesh_are_taken_in(
     [
         (("--photo", "nobody.png"), "nobody.png"),
         (("--photo", "grass", "--mesh", "square", "--set", "layers=0"), "layers"),
-        (("--photo", "grass", "--mesh", "square", "--set", "layers=1000"), "layers"),
+        (("--photo", "new.png", "--mesh", "square", "--set", "layers=1000"), "layers"),
+        (("--photo", "new.png", "--mesh", "square", "--set", "crop=[9, 9, 99, 99]"), "crop"),
+        (("--photo", "new.png", "--mesh", "square", "--set", "crop=all"), "crop"),
         (("--photo", "grass", "--mesh", "square", "--set", "thickness=-1"), "thickness"),
         (("--photo", "grass", "--mesh", "square", "--set", "colour=red"), "colour"),
         (("--photo", "grass", "--mesh", "square", "--set", "nothing"), "FIELD=VALUE"),
     ],
 )
 def test_what_cannot_be_used_is_one_sentence_and_exit_code_2(
-    made: dict[str, Any], home: Path, arguments: tuple[str, ...], words: str
+    made: dict[str, Any], home: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
+    path = tmp_path / "new.png"
+    noise = np.random.default_rng(6).integers(0, 256, (70, 70), dtype=np.uint8)
+    Image.fromarray(noise).save(path)
     before = _files(home / "data")
-    result = tsuya("run", "photo_fur", *arguments)
+    result = tsuya("run", "photo_fur", *(str(path) if a == "new.png" else a for a in arguments))
     assert result.exit_code == 2
     assert words in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
