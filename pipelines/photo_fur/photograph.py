@@ -12,12 +12,10 @@ HIGHLIGHT_SHARE = 0.001
 def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
     """Linear radiance scaled into [0, 1]; a photograph that already lies there stays as it is.
 
-    White is the radiance that only HIGHLIGHT_SHARE of the values exceed.
+    White is the radiance that only HIGHLIGHT_SHARE of the values exceed, but never below 1: an
+    HDR photograph is darkened where it must be, not brightened.
     """
-    if radiance.max() <= 1.0:
-        return radiance.astype(np.float32)
-    # A few lights in the dark: all but them is black, and then the brightest is white.
-    white = np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE) or radiance.max()
+    white = max(1.0, float(np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE)))
     return np.clip(radiance / white, 0.0, 1.0).astype(np.float32)
 
 

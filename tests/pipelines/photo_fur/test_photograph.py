@@ -39,12 +39,12 @@ def test_exposure_does_not_depend_on_the_unit_of_radiance(unit: float) -> None:
     np.testing.assert_allclose(expose(radiance * np.float32(unit)), expose(radiance), rtol=1e-5)
 
 
-def test_a_few_lights_in_the_dark_do_not_divide_by_nothing() -> None:
-    radiance = np.zeros((50, 50, 3), np.float32)
-    radiance[3, 4] = (8.0, 4.0, 2.0)
+def test_a_few_lights_clip_and_brighten_nothing_else() -> None:
+    radiance = np.full((50, 50, 3), 0.25, np.float32)
+    radiance[3, 4] = (8.0, 4.0, 0.5)
     exposed = expose(radiance)
-    np.testing.assert_array_equal(exposed[3, 4], [1.0, 0.5, 0.25])
-    assert np.count_nonzero(exposed) == 3
+    np.testing.assert_array_equal(exposed[3, 4], [1.0, 1.0, 0.5])
+    assert exposed[0, 0, 0] == 0.25
 
 
 # ---- size ------------------------------------------------------------------------------------
