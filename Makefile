@@ -24,7 +24,7 @@ test: setup      ## all tests but the paper-size ones
 	@$(VENV)/python -m pytest -q
 
 test-slow: setup ## the paper-size tests
-	@$(VENV)/python -m pytest -q -m slow
+	@$(VENV)/python -m pytest -q -n 0 -m slow
 
 ui: setup        ## the Dagster web UI on http://127.0.0.1:3000
 	@set -a && . ./.env && $(VENV)/dagster dev -w workspace.yaml -h 127.0.0.1 -p 3000

@@ -24,7 +24,7 @@ import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 KEEP_VERSIONS = 5
 LEAST_AGE_SECONDS = 24 * 3600.0
+_STAMP = "%Y%m%dT%H%M%S%f"
 WHOLE = "whole"
 """Folder of an asset that has no partitions."""
 
@@ -171,7 +172,7 @@ class VersionedStore:
         current version's under equal settings adds no version. Raises StoreFullError, StoreError;
         then nothing that was stored has changed.
         """
-        version = f"{datetime.now(UTC):%Y%m%dT%H%M%S%f}-{uuid.uuid4().hex[:8]}"
+        version = self._new_name(slot)
         staged = self._folder(slot) / "staging" / version
         try:
             named = {"version": version, "partition": slot.partition}
@@ -321,17 +322,32 @@ class VersionedStore:
         staging = (folder / "staging").iterdir()
         left = [path for path in staging if path not in moved and self._is_old(path)]
         for path in (*moved, *left):
-            shutil.rmtree(path, ignore_errors=True)
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
         return [*old, *(path.name for path in left)]
 
     def _is_old(self, path: Path) -> bool:
-        """Whether a path was last changed at least ``least_age_seconds`` ago."""
+        """Whether a path and all in it were last changed ``least_age_seconds`` ago or before."""
+        youngest = time.time() - self.least_age_seconds
         try:
-            return time.time() - path.stat().st_mtime >= self.least_age_seconds
+            # A folder's own time says little: a writer may still be filling it, deep inside.
+            return path.stat().st_mtime <= youngest and all(
+                inside.stat().st_mtime <= youngest for inside in path.rglob("*")
+            )
         except FileNotFoundError:
             return False
 
     # ---- files -------------------------------------------------------------------------------
+
+    def _new_name(self, slot: Slot) -> str:
+        """A name that sorts behind all others, even when the clock was set back."""
+        now = datetime.now(UTC).replace(tzinfo=None)
+        for newest in self.versions(slot)[-1:]:
+            before = datetime.strptime(newest.partition("-")[0], _STAMP)
+            now = max(now, before + timedelta(microseconds=1))
+        return f"{now:{_STAMP}}-{uuid.uuid4().hex[:8]}"
 
     def _folder(self, slot: Slot) -> Path:
         return self.root / slot.system / slot.asset / slot.partition
@@ -346,15 +362,17 @@ class VersionedStore:
             yield self.pointer(slot)
 
     def _point(self, slot: Slot, pointer: Pointer) -> None:
-        self._replace(self._folder(slot) / "current.json", asdict(pointer))
+        self._replace(slot, "current.json", asdict(pointer))
 
     def _note(self, slot: Slot, version: str, check: str, **verdict: Any) -> None:
-        path = self._folder(slot) / "verdicts" / f"{version}.json"
-        self._replace(path, {**self.verdicts(slot, version), check: verdict})
+        fields = {**self.verdicts(slot, version), check: verdict}
+        self._replace(slot, f"verdicts/{version}.json", fields)
 
-    def _replace(self, path: Path, fields: Mapping[str, Any]) -> None:
-        """Write beside, fsync, rename over: a reader sees the old file or the new one."""
-        beside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}")
+    def _replace(self, slot: Slot, name: str, fields: Mapping[str, Any]) -> None:
+        """Write aside, fsync, rename over: a reader sees the old file or the new one."""
+        path = self._folder(slot) / name
+        aside = f"{name.replace('/', '-')}.{uuid.uuid4().hex[:8]}"
+        beside = self._folder(slot) / "staging" / aside
         try:
             path.parent.mkdir(exist_ok=True)
             with beside.open("w") as file:

@@ -41,7 +41,6 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
     prepared = dataset.assign_attrs({RECORD: record})
     encoding: dict[str, dict[str, Any]] = {}
     for name, variable in prepared.variables.items():
-        variable.encoding = {}
         chunks = _chunk_shape(variable.shape, variable.dtype.itemsize)
         if variable.chunks is not None:
             chunks = _lazy_chunks(variable, chunks)

@@ -97,8 +97,8 @@ def test_killed_at_random_moments(
     store = VersionedStore(tmp_path, keep=2, least_age_seconds=0.0)
     moments = random.Random(len(checks))
 
-    first = writers.start("write_many", **place, first=1, count=2)
     started = time.monotonic()
+    first = writers.start("write_many", **place, first=1, count=2)
     begun, *_, ended = first.finish()
     earliest, latest = (event["time"] - started for event in (begun, ended))
 

@@ -209,7 +209,7 @@ def test_all_is_on_disk_before_the_pointer_names_it(
     files = list(store.folder(slot).rglob("*"))
     expected = {f"fsync staging/{version}/{path.relative_to(store.folder(slot))}" for path in files}
     assert set(staged) == {*expected, f"fsync staging/{version}"}
-    beside = [event for event in events if event.startswith("fsync current.json.")]
+    beside = [event for event in events if event.startswith("fsync staging/current.json.")]
     assert events[len(staged) :] == [
         "rename versions",
         "fsync versions",
