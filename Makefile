@@ -11,8 +11,8 @@ help:            ## this list
 
 setup: $(SETUP)  ## system libraries, .venv, .env, dagster.yaml
 
-$(SETUP): pyproject.toml constraints.txt setup/system_libraries.sh setup/make_environment.sh
-	@setup/system_libraries.sh
+$(SETUP): pyproject.toml constraints.txt setup/system_packages.sh setup/make_environment.sh
+	@setup/system_packages.sh
 	@echo "Setting up .venv (two minutes or so, once) …"
 	@setup/make_environment.sh
 	@touch $@

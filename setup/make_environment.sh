@@ -10,11 +10,7 @@ python=${PYTHON:-python3}
     exit 1
 }
 if [ ! -x .venv/bin/python ]; then
-    "$python" -m venv .venv || {
-        rm -rf .venv
-        echo "python3 -m venv failed; on Debian and Ubuntu: sudo apt-get install -y python3-venv" >&2
-        exit 1
-    }
+    "$python" -m venv .venv || { rm -rf .venv; exit 1; }
 fi
 .venv/bin/python -m pip install --quiet --disable-pip-version-check \
     --constraint constraints.txt --editable '.[dev]'

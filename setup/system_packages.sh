@@ -1,12 +1,13 @@
 #!/bin/sh
-# Makes sure that the shared libraries are there which the Python wheels expect from the system:
-# EGL and a Mesa driver to draw without a screen (VTK), libusb and libgomp (Open3D).
-# Installs them as root with apt; otherwise says the one command that does.
+# Makes sure that what the Python wheels expect from the system is there: EGL and a Mesa driver to
+# draw without a screen (VTK), libusb and libgomp (Open3D); and venv, which Debian keeps apart.
+# Installs what is missing as root with apt; otherwise says the one command that does.
 set -eu
 
 has() { ldconfig -p 2>/dev/null | grep -q "$1" || ls /usr/lib/*/"$1"* /usr/lib64/"$1"* >/dev/null 2>&1; }
 
 packages=""
+"${PYTHON:-python3}" -c 'import ensurepip, venv' 2>/dev/null || packages="$packages python3-venv"
 has libEGL.so.1 || packages="$packages libegl1"
 has libGL.so.1 || packages="$packages libgl1"
 has libEGL_mesa.so.0 || packages="$packages libegl-mesa0"
@@ -18,15 +19,15 @@ has libXrender.so.1 || packages="$packages libxrender1"
 [ -z "$packages" ] && exit 0
 
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-    echo "Installing system libraries:$packages"
+    echo "Installing system packages:$packages"
     export DEBIAN_FRONTEND=noninteractive
     apt-get update -qq
     # shellcheck disable=SC2086  # a list of names
     apt-get install -y -qq --no-install-recommends $packages >/dev/null
 elif command -v apt-get >/dev/null; then
-    echo "System libraries are missing; install them with: sudo apt-get install -y$packages" >&2
+    echo "System packages are missing; install them with: sudo apt-get install -y$packages" >&2
     exit 1
 else
-    echo "System libraries are missing; install what your system calls (Debian's names):$packages" >&2
+    echo "System packages are missing; install what your system calls (Debian's names):$packages" >&2
     exit 1
 fi
