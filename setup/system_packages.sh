@@ -4,14 +4,20 @@
 # Installs what is missing as root with apt; otherwise says the one command that does.
 set -eu
 
-has() { ldconfig -p 2>/dev/null | grep -q "$1" || ls /usr/lib/*/"$1"* /usr/lib64/"$1"* >/dev/null 2>&1; }
+exists() { for path in "$@"; do [ -e "$path" ] && return 0; done; return 1; }
+has() {
+    ldconfig -p 2>/dev/null | grep -q "$1" || exists /usr/lib/*/"$1"* /usr/lib64/"$1"* /usr/lib/"$1"*
+}
+has_driver() { # Mesa's software renderer: a driver of its own, or part of one library
+    exists /usr/lib/*/dri/*swrast_dri.so /usr/lib64/dri/*swrast_dri.so || has libgallium
+}
 
 packages=""
 "${PYTHON:-python3}" -c 'import ensurepip, venv' 2>/dev/null || packages="$packages python3-venv"
 has libEGL.so.1 || packages="$packages libegl1"
 has libGL.so.1 || packages="$packages libgl1"
 has libEGL_mesa.so.0 || packages="$packages libegl-mesa0"
-ls /usr/lib/*/dri/*swrast* /usr/lib64/dri/*swrast* >/dev/null 2>&1 || has libgallium || packages="$packages libgl1-mesa-dri"
+has_driver || packages="$packages libgl1-mesa-dri"
 has libusb-1.0.so.0 || packages="$packages libusb-1.0-0"
 has libgomp.so.1 || packages="$packages libgomp1"
 has libX11.so.6 || packages="$packages libx11-6"
