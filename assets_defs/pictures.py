@@ -36,5 +36,12 @@ def thumbnail(picture: NDArray[np.uint8]) -> dg.MarkdownMetadataValue:
 
 
 def table(rows: Sequence[Mapping[str, int | float | str]]) -> dg.TableMetadataValue:
-    """Rows of equal columns as a table."""
-    return dg.MetadataValue.table(records=[dg.TableRecord(dict(row)) for row in rows])
+    """Rows of equal columns as a table; fractions with four digits that count."""
+    shown = [
+        {
+            name: float(f"{cell:.4g}") if isinstance(cell, float) else cell
+            for name, cell in row.items()
+        }
+        for row in rows
+    ]
+    return dg.MetadataValue.table(records=[dg.TableRecord(row) for row in shown])

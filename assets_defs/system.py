@@ -331,7 +331,7 @@ class System:
         shown = plan.pictures(dataset) if plan.pictures else {}
         thumbnails = {name: thumbnail(picture) for name, picture in shown.items()}
         return dg.Output(
-            dataset.assign_attrs({RECORD: record}), metadata={**metadata, **thumbnails}
+            dataset.assign_attrs({RECORD: record}), metadata={**thumbnails, **metadata}
         )
 
 
