@@ -11,6 +11,7 @@ from assets_defs.checks import Check, Checked
 from assets_defs.pictures import table
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Dimension, Metadata, Source, System
+from pipelines.photo_fur import figures
 from pipelines.photo_fur.attenuation import MOST_LAYERS, Tails
 from pipelines.photo_fur.drawing import Fill
 from storage.readers.meshes import read_mesh
@@ -97,12 +98,11 @@ def _photo_pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _contrast(checked: Checked) -> float:
-    low, high = checked.dataset["luminance"].load().quantile([0.01, 0.99]).values
-    return float((high - low) / (high + low))
+    return figures.contrast(checked.dataset["luminance"].values)
 
 
 def _clipped_share(checked: Checked) -> float:
-    return float((checked.dataset["radiance"] >= 1.0).all("channel").mean())
+    return figures.clipped_share(checked.dataset["radiance"].values)
 
 
 @FUR.asset(
@@ -207,14 +207,12 @@ def _kept_share(checked: Checked) -> float:
 
 
 def _decay_error(checked: Checked) -> float:
-    """Largest relative step between the stored I(n) and Eq. 1 at the depths of Eq. 3."""
-    import numpy as np
-
-    dataset = checked.dataset.load()
-    stored = dataset["boundary_luminance"].values
-    depth = np.linspace(0.0, 1.0, len(stored))
-    expected = float(dataset["brightest"]) * np.exp(-float(dataset["attenuation"]) * depth)
-    return float(np.abs(stored / expected - 1.0).max())
+    dataset = checked.dataset
+    return figures.decay_error(
+        dataset["boundary_luminance"].values,
+        float(dataset["brightest"]),
+        float(dataset["attenuation"]),
+    )
 
 
 def _depth_rank_correlation(checked: Checked) -> float | None:
@@ -282,7 +280,7 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
         "bright_tail": ((), np.int64(np.count_nonzero(luminance > fitted.brightest))),
         "dark_tail": ((), np.int64(np.count_nonzero(luminance < fitted.darkest))),
     }
-    figures = {
+    shown = {
         "Imax": fitted.brightest,
         "Imin": fitted.darkest,
         "attenuation a": fitted.coefficient,
@@ -290,14 +288,14 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
     if "depth" in fur_photo:
         correlation = depth_rank_correlation(luminance, fur_photo["depth"].values)
         variables["depth_rank_correlation"] = ((), correlation)
-        figures["depth rank correlation"] = correlation
+        shown["depth rank correlation"] = correlation
     rows = [
         {"layer": n + 1, "from I": float(above), "to I": float(below), "pixels": int(count)}
         for n, (above, below, count) in enumerate(
             zip(boundaries[:-1], boundaries[1:], pixels, strict=True)
         )
     ]
-    return xr.Dataset(variables), {**figures, "layers": table(rows)}
+    return xr.Dataset(variables), {**shown, "layers": table(rows)}
 
 
 # ---- shell_stack -----------------------------------------------------------------------------
@@ -319,33 +317,18 @@ def _stack_pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _partition_error(checked: Checked) -> float:
-    """Share of the pixels whose masks do not say once, and only once, what ``layer`` says."""
-    import numpy as np
-
-    dataset = checked.dataset.load()
-    times = dataset["mask"].sum("shell").values
-    first = dataset["mask"].values.argmax(axis=0) + 1
-    layer = dataset["layer"].values
-    wrong = np.where(layer == 0, times != 0, (times != 1) | (first != layer))
-    return float(wrong.mean())
+    dataset = checked.dataset
+    return figures.partition_error(dataset["layer"].values, dataset["mask"].values)
 
 
 def _interval_error(checked: Checked) -> float:
-    """Share of the pixels outside their layer's interval of luminance (section 3.2)."""
-    import numpy as np
-
-    record = checked.record["settings"]
-    layer = checked.dataset["layer"].values
-    luminance = checked.input("fur_photo")["luminance"].values
-    bounds = medium(checked.input("attenuation")).boundaries(record["layers"])
-    if record["tails"] == "end layers":
-        bounds[0], bounds[-1] = np.inf, -np.inf
-    above = bounds[np.maximum(layer, 1) - 1]
-    below = bounds[np.maximum(layer, 1)]
-    last = layer == record["layers"]
-    inside = (luminance <= above) & ((luminance > below) | (last & (luminance == below)))
-    outside = (luminance > bounds[0]) | (luminance < bounds[-1])
-    return float(np.where(layer == 0, ~outside, ~inside).mean())
+    settings = checked.record["settings"]
+    return figures.interval_error(
+        checked.dataset["layer"].values,
+        checked.input("fur_photo")["luminance"].values,
+        medium(checked.input("attenuation")).boundaries(settings["layers"]),
+        settings["tails"],
+    )
 
 
 @FUR.asset(
@@ -414,17 +397,10 @@ class MeshSettings(Settings):
 
 
 def _step_error(checked: Checked) -> float:
-    """Largest distance, per thickness, of a shell's vertex from where Eq. 3 puts it."""
-    import numpy as np
-
-    dataset = checked.dataset.load()
-    thickness = float(dataset["thickness"])
-    layers = dataset.sizes["shell"]
-    height = thickness * (1.0 - np.arange(1, layers + 1) / layers)
-    skin = dataset["vertices"].values[-1].astype(np.float64)
-    expected = skin + height[:, None, None] * dataset["normals"].values
-    error = np.linalg.norm(dataset["vertices"].values - expected, axis=-1)
-    return float(error.max() / thickness)
+    dataset = checked.dataset
+    return figures.step_error(
+        dataset["vertices"].values, dataset["normals"].values, float(dataset["thickness"])
+    )
 
 
 def _stretch(checked: Checked) -> float:

@@ -1,0 +1,60 @@
+"""Figures that tell whether a stored result is right, each computed apart from what made it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.photo_fur.attenuation import Tails
+
+
+def contrast(luminance: NDArray[np.floating]) -> float:
+    """Michelson contrast of the 1 % and 99 % luminances, in [0, 1]."""
+    low, high = np.quantile(luminance, [0.01, 0.99])
+    return float((high - low) / (high + low))
+
+
+def clipped_share(radiance: NDArray[np.floating]) -> float:
+    """Share of the pixels (y, x, channel) that are pure white."""
+    return float((radiance >= 1.0).all(axis=-1).mean())
+
+
+def decay_error(boundaries: NDArray[np.float64], brightest: float, coefficient: float) -> float:
+    """Largest relative step of I(n) (Eq. 4) from Eq. 1 at the depths of Eq. 3."""
+    depth = np.linspace(0.0, 1.0, len(boundaries))
+    return float(np.abs(boundaries / (brightest * np.exp(-coefficient * depth)) - 1.0).max())
+
+
+def partition_error(layer: NDArray[np.uint8], masks: NDArray[np.bool_]) -> float:
+    """Share of the pixels whose masks do not say once, and only once, what ``layer`` says."""
+    times = masks.sum(axis=0)
+    first = masks.argmax(axis=0) + 1
+    wrong = np.where(layer == 0, times != 0, (times != 1) | (first != layer))
+    return float(wrong.mean())
+
+
+def interval_error(
+    layer: NDArray[np.uint8],
+    luminance: NDArray[np.floating],
+    boundaries: NDArray[np.float64],
+    tails: Tails,
+) -> float:
+    """Share of the pixels outside their layer's interval of luminance (section 3.2)."""
+    bounds = boundaries.copy()
+    if tails == "end layers":
+        bounds[0], bounds[-1] = np.inf, -np.inf
+    above, below = bounds[np.maximum(layer, 1) - 1], bounds[np.maximum(layer, 1)]
+    at_the_skin = (layer == len(bounds) - 1) & (luminance == below)
+    inside = (luminance <= above) & ((luminance > below) | at_the_skin)
+    outside = (luminance > bounds[0]) | (luminance < bounds[-1])
+    return float(np.where(layer == 0, ~outside, ~inside).mean())
+
+
+def step_error(
+    shells: NDArray[np.floating], normals: NDArray[np.floating], thickness: float
+) -> float:
+    """Largest distance, per thickness, of a shell's vertex from where Eq. 3 puts it."""
+    layers = len(shells)
+    heights = thickness * (1.0 - np.arange(1, layers + 1) / layers)
+    expected = shells[-1].astype(np.float64) + heights[:, None, None] * normals
+    return float(np.linalg.norm(shells - expected, axis=-1).max() / thickness)
