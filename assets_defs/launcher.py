@@ -25,7 +25,12 @@ JobByName = Callable[[str], dg.JobDefinition]
 
 
 class LaunchError(Exception):
-    """A run failed; the text is one sentence that says where and why."""
+    """Runs failed; the text has one sentence for each that says where and why."""
+
+    def __init__(self, failures: Sequence[str], outcomes: Sequence[Outcome]) -> None:
+        super().__init__("\n".join(failures))
+        self.outcomes = tuple(outcomes)
+        """What was made all the same, and what was current."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,10 @@ class Outcome:
     """Time of its steps: the asset's own and its checks'."""
 
 
+class _RunError(Exception):
+    """One run failed; the text says why."""
+
+
 @dataclass(frozen=True)
 class Launcher:
     """Launches requests on one Dagster instance and one store."""
@@ -65,17 +74,28 @@ class Launcher:
     def launch(self, request: Request) -> list[Outcome]:
         """Run what is not current. Raises SettingsError, ValueError before any work; LaunchError.
 
-        Every source is read and every setting is checked before the first run starts.
+        Every source is read and every setting is checked before the first run starts. Where a run
+        fails, what is made from it is left out, and the rest goes on.
         """
         planned = self._plan(request)
         for dimension in request.system.dimensions:
             name = request.system.dynamic(dimension.name).name
             self.instance.add_dynamic_partitions(str(name), _keys(request, dimension.name))
         outcomes: list[Outcome] = []
+        failures: list[str] = []
+        failed: list[dict[str, str]] = []
         for done, (by, keys) in enumerate(planned):
             self.progress(request.system.name, done / len(planned))
-            outcomes += self._run_grain(request, by, keys)
+            if any(broken.items() <= keys.items() for broken in failed):
+                continue
+            try:
+                outcomes += self._run_grain(request, by, keys)
+            except _RunError as error:
+                failures.append(f"{request.system.name} [{', '.join(keys.values())}]: {error}")
+                failed.append(keys)
         self.progress(request.system.name, 1.0)
+        if failures:
+            raise LaunchError(failures, outcomes)
         return outcomes
 
     def _plan(self, request: Request) -> list[tuple[tuple[str, ...], dict[str, str]]]:
@@ -141,7 +161,7 @@ class Launcher:
             asset_selection=[dg.AssetKey([system.name, name]) for name in stale],
         )
         if not result.success:
-            raise LaunchError(f"{system.name} [{', '.join(keys.values())}]: {_why(result)}")
+            raise _RunError(_why(result))
         seconds: dict[str, float] = {}
         for event in result.all_events:
             if event.is_step_success:
@@ -241,5 +261,6 @@ def _why(result: dg.ExecuteInProcessResult) -> str:
             error = event.step_failure_data.error
             while error.cause is not None:
                 error = error.cause
-            return error.message.strip()
+            _, _, sentence = error.message.strip().partition(f"{error.cls_name}: ")
+            return sentence or error.message.strip()
     return "the run failed; its log in the web UI says why."

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import dagster as dg
 from pydantic import Field
 
-from assets_defs.launcher import JobByName, Launcher, Request
+from assets_defs.launcher import JobByName, Launcher, LaunchError, Request
 from assets_defs.system import System
 
 
@@ -31,10 +31,18 @@ def launch_job(systems: Mapping[str, System], job: JobByName) -> dg.JobDefinitio
         workspace, progress = context.resources.workspace, context.resources.progress
         launcher = Launcher(context.instance, workspace, job, progress)
         chosen = [systems[config.system]] if config.system else list(systems.values())
+        failures = []
         for system in chosen:
-            partitions = config.partitions or system.made(workspace.store)
-            for outcome in launcher.launch(Request(system, partitions, force=config.force)):
+            partitions = config.partitions or system.made(workspace)
+            try:
+                outcomes = launcher.launch(Request(system, partitions, force=config.force))
+            except LaunchError as error:
+                failures.append(str(error))
+                outcomes = list(error.outcomes)
+            for outcome in outcomes:
                 context.log.info(f"{outcome.slot}: {outcome.state}")
+        if failures:
+            raise dg.Failure("\n".join(failures), allow_retries=False)
 
     @dg.job(
         name="launch",

@@ -161,13 +161,20 @@ class System:
         names = list(wanted)
         return [dict(zip(names, keys, strict=True)) for keys in itertools.product(*wanted.values())]
 
-    def made(self, store: VersionedStore) -> list[dict[str, str]]:
-        """Every partition that has a current version of some asset, as keys by dimension."""
+    def made(self, workspace: Workspace) -> list[dict[str, str]]:
+        """Every partition that was made and whose sources are still there, as keys by dimension."""
+        inbox = workspace.inbox(self.name)
+        known = {
+            dimension.name: set(self.sources(dimension.name, inbox))
+            for dimension in self.dimensions
+        }
         found = []
-        for slot in store.slots():
+        for slot in workspace.store.slots():
             if slot.system == self.name and slot.asset in self.plans:
                 by = sorted(self.plans[slot.asset].by)
-                found.append(dict(zip(by, slot.partition.split("."), strict=True)))
+                keys = dict(zip(by, slot.partition.split("."), strict=True))
+                if all(key in known[name] for name, key in keys.items()):
+                    found.append(keys)
         return found
 
     def examples(self) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 from rich.console import Console
@@ -47,8 +47,6 @@ def _says_errors(command: Callable[..., None]) -> Callable[..., None]:
     def wrapped(*arguments: Any, **options: Any) -> None:
         try:
             command(*arguments, **options)
-        except LaunchError as error:
-            _fail(str(error), 1)
         except (ValueError, StoreError, SetUpError) as error:
             _fail(str(error), 2)
 
@@ -78,9 +76,7 @@ def _run_command(system: System) -> click.Command:
     def launch(
         preset: str | None, settings: Sequence[str], force: bool, as_json: bool, **items: Any
     ) -> None:
-        console = Console(stderr=True)
-        with open_session(console) as session:
-            started = time.perf_counter()
+        with open_session(Console(stderr=True)) as session:
             given = _fields(settings)
             check_settings(system, preset, given)  # before a file is copied
             chosen = {
@@ -91,9 +87,8 @@ def _run_command(system: System) -> click.Command:
                 for dimension in system.dimensions
             }
             request = Request(system, system.span(chosen), preset, given, force)
-            outcomes = session.launcher.launch(request)
-            seconds = time.perf_counter() - started
-        _report(session, outcomes, seconds, as_json)
+            launched = _launch(session, [request])
+        _report(session, launched, as_json)
 
     options: list[click.Parameter] = [
         click.Option(
@@ -134,16 +129,12 @@ for _system in SYSTEMS.values():
 @_says_errors
 def demo(as_json: bool) -> None:
     """Make every system's built-in examples and write their pictures."""
-    console = Console(stderr=True)
-    started = time.perf_counter()
-    outcomes: list[Outcome] = []
-    with open_session(console) as session:
-        for system in SYSTEMS.values():
-            request = Request(system, system.examples(), preset="demo")
-            outcomes += session.launcher.launch(request)
-    seconds = time.perf_counter() - started
-    written = write_gallery(session.workspace.store, [each.slot for each in outcomes], PICTURES)
-    _report(session, outcomes, seconds, as_json)
+    with open_session(Console(stderr=True)) as session:
+        requests = [Request(system, system.examples(), "demo") for system in SYSTEMS.values()]
+        launched = _launch(session, requests)
+    slots = [outcome.slot for outcome in launched.outcomes]
+    written = write_gallery(session.workspace.store, slots, PICTURES)
+    _report(session, launched, as_json)
     if not as_json:
         for path in written:
             click.echo(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
@@ -232,11 +223,38 @@ def _fields(settings: Sequence[str]) -> Mapping[str, Any]:
     return fields
 
 
-def _report(session: Session, outcomes: Sequence[Outcome], seconds: float, as_json: bool) -> None:
-    reports = outcome_reports(session.workspace.store, outcomes)
+class _Launched(NamedTuple):
+    """What several launches came to."""
+
+    outcomes: list[Outcome]
+    failures: list[str]
+    seconds: float
+
+
+def _launch(session: Session, requests: Sequence[Request]) -> _Launched:
+    """Launch one after the other; a failure ends none of the others."""
+    started = time.perf_counter()
+    outcomes: list[Outcome] = []
+    failures: list[str] = []
+    for request in requests:
+        try:
+            outcomes += session.launcher.launch(request)
+        except LaunchError as error:
+            outcomes += error.outcomes
+            failures.append(str(error))
+    return _Launched(outcomes, failures, time.perf_counter() - started)
+
+
+def _report(session: Session, launched: _Launched, as_json: bool) -> None:
+    """Print what became of the launches; exit with 1 where something failed."""
+    reports = outcome_reports(session.workspace.store, launched.outcomes)
     if as_json:
-        click.echo(json.dumps({"seconds": round(seconds, 3), "assets": reports}))
-        return
-    _output().print(sizes_table(reports), figures_table(reports))
-    made = sum(1 for outcome in outcomes if outcome.state == "made")
-    click.echo(f"{made} made, {len(outcomes) - made} current already, {seconds:.1f} s.")
+        summary = {"seconds": round(launched.seconds, 3), "failures": launched.failures}
+        click.echo(json.dumps(summary | {"assets": reports}))
+    else:
+        _output().print(sizes_table(reports), figures_table(reports))
+        made = sum(1 for outcome in launched.outcomes if outcome.state == "made")
+        current = len(reports) - made
+        click.echo(f"{made} made, {current} current already, {launched.seconds:.1f} s.")
+    if launched.failures:
+        _fail("\n".join(launched.failures), 1)

@@ -19,7 +19,7 @@ from assets_defs.definitions import SYSTEMS
 from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
 from assets_defs.photo_fur import FUR
-from assets_defs.system import partition_key
+from assets_defs.system import Source, partition_key
 from storage.schemas import schemas_of
 from storage.versions import Slot
 
@@ -135,6 +135,15 @@ def test_the_schedule_makes_again_what_was_made(house: Any) -> None:
     after = _materialisations(house)
     assert after["fur_frames"] == before["fur_frames"] + 1
     assert after["fur_photo"] == before["fur_photo"] + 1
+
+
+def test_what_has_lost_its_file_is_not_made_again(dropped: Any) -> None:
+    (path,) = dropped.workspace.inbox("photo_fur").iterdir()
+    key = Source.of(path).key
+    dropped.launcher.launch(Request(FUR, [{"photo": key}, {"photo": "grass"}], "test"))
+    assert {"photo": key} in FUR.made(dropped.workspace)
+    path.unlink()
+    assert FUR.made(dropped.workspace) == [{"photo": "grass"}] * 3
 
 
 def _materialisations(house: Any) -> dict[str, int]:

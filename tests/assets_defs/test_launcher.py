@@ -94,6 +94,26 @@ def test_a_failure_is_told_in_its_own_words_and_ends_the_launch(
     assert [run.job_name for run in runs] == ["photo_fur_photo"]
 
 
+def test_a_failure_leaves_out_what_needs_it_and_the_rest_goes_on(
+    house: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = attenuation.fit_attenuation
+
+    def wrong_for_large(luminance: Any, **options: Any) -> Any:
+        if luminance.shape == (64, 64):
+            raise ValueError("this pelt is wrong.")
+        return right(luminance, **options)
+
+    monkeypatch.setattr(attenuation, "fit_attenuation", wrong_for_large)
+    keys = [{"photo": photo, "mesh": "square"} for photo in ("pelt", "grass")]
+    with pytest.raises(LaunchError, match="this pelt is wrong") as failure:
+        house.launcher.launch(Request(FUR, keys, "test", force=True))
+    assert len(str(failure.value).splitlines()) == 1
+    made = {str(outcome.slot) for outcome in failure.value.outcomes}
+    assert "photo_fur/fur_frames/square.grass" in made
+    assert "photo_fur/fur_frames/square.pelt" not in made
+
+
 def test_a_passing_trouble_is_tried_again(house: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     right = attenuation.fit_attenuation
     tries = []
@@ -105,7 +125,7 @@ def test_a_passing_trouble_is_tried_again(house: Any, monkeypatch: pytest.Monkey
         return right(*arguments, **options)
 
     monkeypatch.setattr(attenuation, "fit_attenuation", flaky)
-    house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test"))
+    house.launcher.launch(Request(FUR, [{"photo": "grass"}], "test", force=True))
     assert len(tries) == 2
 
 
