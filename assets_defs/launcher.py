@@ -14,7 +14,7 @@ from typing import Any, Literal
 import dagster as dg
 
 from assets_defs.settings import Settings, resolve
-from assets_defs.system import AssetPlan, Progress, System, partition_key, provenance
+from assets_defs.system import INTERRUPTED, AssetPlan, Progress, System, partition_key, provenance
 from assets_defs.workspace import Workspace
 from storage.versions import Slot
 
@@ -74,6 +74,7 @@ class Launcher:
     def launch(self, request: Request) -> list[Outcome]:
         """Run what is not current. Raises SettingsError, ValueError before any work; LaunchError.
 
+        An interruption (Ctrl-C) ends the run at work and the launch: KeyboardInterrupt.
         Every source is read and every setting is checked before the first run starts. Where a run
         fails, what is made from it is left out, and the rest goes on.
         """
@@ -161,7 +162,10 @@ class Launcher:
             asset_selection=[dg.AssetKey([system.name, name]) for name in stale],
         )
         if not result.success:
-            raise _RunError(_why(result))
+            why = _why(result)
+            if why == INTERRUPTED:
+                raise KeyboardInterrupt
+            raise _RunError(why)
         seconds: dict[str, float] = {}
         for event in result.all_events:
             if event.is_step_success:

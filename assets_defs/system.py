@@ -42,6 +42,8 @@ Progress = Callable[[str, float], None]
 """Told what is being done and the fraction that is done."""
 
 RETRIES = dg.RetryPolicy(max_retries=2, delay=1)
+INTERRUPTED = "interrupted"
+"""Why a run failed that a person stopped."""
 OWNERS = ("team:tsuya",)
 
 
@@ -327,6 +329,9 @@ class System:
             }
             named = inspect.signature(function).parameters
             dataset, metadata = function(**{name: offered[name] for name in named})
+        except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
+            # Left to itself, Dagster would take the interruption for trouble and try again.
+            raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
         except (ValueError, SchemaError) as error:
             # What the user gave cannot work: a second try would not either.
             raise dg.Failure(description=str(error), allow_retries=False) from error

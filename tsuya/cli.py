@@ -1,6 +1,6 @@
 """The command line: ``tsuya run``, ``demo``, ``status``, ``path``, ``rollback``, ``doctor``.
 
-Exit codes: 0 done, 1 a run or a check failed, 2 what was given cannot be used.
+Exit codes: 0 done, 1 a run or a check failed, 2 what was given cannot be used, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -47,6 +47,8 @@ def _says_errors(command: Callable[..., None]) -> Callable[..., None]:
     def wrapped(*arguments: Any, **options: Any) -> None:
         try:
             command(*arguments, **options)
+        except KeyboardInterrupt:
+            _fail("Interrupted: what was made stays; run again to go on.", 130)
         except (ValueError, StoreError, SetUpError) as error:
             _fail(str(error), 2)
 

@@ -239,6 +239,22 @@ def test_a_run_killed_at_any_time_loses_nothing(made: dict[str, Any], home: Path
     assert widths == {128}
 
 
+def test_an_interruption_ends_the_run_soon(home: Path) -> None:
+    """Ctrl-C while the virtual pelt is photographed, which takes long in this size."""
+    command = [str(Path(sys.executable).parent / "tsuya"), "run", "photo_fur", "--photo", "pelt"]
+    command += ["--mesh", "square", "--set", "pelt_samples=4000", "--set", "pelt_size=300"]
+    process = subprocess.Popen(
+        command, env=os.environ, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    assert "fur_photo" in process.stderr.readline()
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Interrupted" in said
+
+
 def _files(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes()
