@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -383,6 +383,9 @@ class MeshSettings(Settings):
         allow_inf_nan=False,
         description="Thickness of the fur in mesh units; by default 6 % of the mesh's radius",
     )
+    up: Literal["auto", "y", "z"] = Field(
+        "auto", description="The mesh's upward axis; auto: y for GLB, as glTF has it, else z"
+    )
     repeats: float = Field(
         1.0,
         gt=0.0,
@@ -443,7 +446,10 @@ def shell_mesh(settings: MeshSettings, source: Source) -> Result:
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
-        mesh = geometry.make_mesh(*read_mesh(source.path))
+        vertices, triangles, uvs = read_mesh(source.path)
+        if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
+            vertices = geometry.turned_up(vertices)
+        mesh = geometry.make_mesh(vertices, triangles, uvs)
     else:
         mesh = {
             SQUARE: lambda: geometry.square(32),

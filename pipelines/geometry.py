@@ -457,6 +457,12 @@ def _mesh_of_charts(charts: Sequence[_Chart]) -> Mesh:
     return make_mesh(np.concatenate(vertices), np.concatenate(triangles), np.concatenate(uvs))
 
 
+def turned_up(vertices: ArrayLike) -> NDArray[np.float64]:
+    """Vertices (V, 3) of a mesh whose up is +y, turned about x so that it is +z."""
+    x, y, z = np.asarray(vertices, dtype=np.float64).T
+    return np.stack([x, -z, y], axis=-1)
+
+
 def texture_stretch(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike) -> float:
     """Median over the triangles of how far the texture is drawn out of shape; 1 = not at all.
 

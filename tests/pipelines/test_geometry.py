@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
+from pipelines import geometry
 from pipelines.geometry import Mesh, make_mesh, sphere, square, teapot, unwrap, vertex_normals
 from pipelines.teapot_patches import HANDLE, KNOB, RIM, SPOUT, swept_quarter
 
@@ -318,3 +319,19 @@ def test_meshes_that_cannot_be_made(
 ) -> None:
     with pytest.raises(ValueError, match=reason):
         make_mesh(vertices, triangles, uvs)
+
+
+def test_turning_up_is_a_rotation_that_takes_y_to_z() -> None:
+    turned = geometry.turned_up(np.eye(3))
+    np.testing.assert_array_equal(turned, [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+
+
+def test_texture_stretch_is_the_ratio_of_the_sides_of_a_drawn_out_square() -> None:
+    plane = geometry.square(4)
+    for factor in (1.0, 2.0, 5.0):
+        drawn = plane.vertices * [factor, 1.0, 1.0]
+        found = geometry.texture_stretch(drawn, plane.triangles, plane.uvs)
+        assert found == pytest.approx(factor)
+    flat = geometry.texture_stretch(plane.vertices, plane.triangles, np.zeros_like(plane.uvs))
+    assert flat == np.inf

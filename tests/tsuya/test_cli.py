@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from assets_defs.workspace import Workspace
+from storage.zarr_files import open_dataset
 from tsuya.cli import main
 from tsuya.gallery import write_gallery
 
@@ -98,6 +99,25 @@ def test_the_users_photograph_and_mesh_are_taken_in(
     # 16 bits are kept: more luminances than 8 bits can tell apart.
     assert len(np.unique(photo["luminance"].values)) > 1000
     assert store.open(slots["photo_fur/shell_mesh/tent-obj"]).sizes["shell"] == 6
+
+
+def test_a_mesh_stands_on_its_feet(made: dict[str, Any], home: Path, tmp_path: Path) -> None:
+    """GLB has y up, by its standard; other formats are told with `up`."""
+    import trimesh
+
+    tower = trimesh.creation.box(extents=(1.0, 4.0, 1.0))
+    heights = {}
+    for name, more in (("tower.glb", ()), ("lying.ply", ()), ("told.ply", ("--set", "up=y"))):
+        tower.export(tmp_path / name)
+        result = tsuya(
+            *("run", "photo_fur", "--photo", "grass", "--mesh", str(tmp_path / name)),
+            *("--preset", "test", *more),
+        )
+        assert result.exit_code == 0, result.output
+        folder = tsuya("path", f"photo_fur/shell_mesh/{name.replace('.', '-')}").stdout.strip()
+        skin = open_dataset(Path(folder))["vertices"].values[-1]
+        heights[name] = float(np.ptp(skin[:, 2]))
+    assert heights == pytest.approx({"tower.glb": 4.0, "lying.ply": 1.0, "told.ply": 4.0})
 
 
 @pytest.mark.parametrize(
