@@ -486,7 +486,7 @@ class FrameSettings(Settings):
         640,
         ge=32,
         le=4096,
-        description="Pixels across, 4:3; the square's pictures have the photograph's size",
+        description="Pixels across, 4:3; the square's pictures go by the photograph's size",
     )
     supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
     tails: Tails = "end layers"
@@ -571,6 +571,7 @@ def fur_frames(
         ROUND_VIEWS,
         SQUARE_VIEWS,
         draw_frames,
+        size_from_above,
         square_of_photograph,
     )
 
@@ -578,8 +579,8 @@ def fur_frames(
     shells = shell_mesh["vertices"].values
     views, size = ROUND_VIEWS, (settings.width * 3 // 4, settings.width)
     if keys["mesh"] == SQUARE:
-        views, size = SQUARE_VIEWS, radiance.shape[:2]
-        shells = square_of_photograph(shells, size)
+        views, size = SQUARE_VIEWS, size_from_above(radiance.shape[:2])
+        shells = square_of_photograph(shells, radiance.shape[:2])
     drawn = draw_frames(
         radiance,
         fur_photo["luminance"].values,

@@ -14,6 +14,8 @@ from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
 from pipelines.stage import Camera, Light, Stage, fitting_distance, orbit
 
 BACKGROUND = (0.32, 0.34, 0.37)
+LEAST_SIDE = 384
+"""Pictures of a smaller photograph show a texel in several pixels."""
 _VIEW_ANGLE = 30.0
 _MARGIN = 1.03
 
@@ -24,7 +26,7 @@ class View(NamedTuple):
     azimuth: float
     elevation: float
     photograph: bool = False
-    """Straight above, orthographic, unlit, a texel a pixel: shows the photograph itself."""
+    """Straight above, orthographic, unlit, nearest texel: shows the photograph itself."""
 
 
 SQUARE_VIEWS = (View(-90.0, 90.0, photograph=True), View(-60.0, 28.0))
@@ -94,9 +96,21 @@ def draw_frames(
 
 
 def top_view_error(picture: NDArray[np.uint8], radiance: NDArray[np.floating]) -> float:
-    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB."""
-    step = picture.astype(np.float64) - to_8bit(radiance)
+    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB.
+
+    The picture has one pixel a texel, or a square of pixels each.
+    """
+    times = len(picture) // len(radiance)
+    expected = to_8bit(radiance).repeat(times, axis=0).repeat(times, axis=1)
+    step = picture.astype(np.float64) - expected
     return float(np.sqrt(np.mean((step / 255.0) ** 2)))
+
+
+def size_from_above(shape: tuple[int, int]) -> tuple[int, int]:
+    """Size of the square's pictures: the photograph's, or several times it where that is small."""
+    height, width = shape
+    times = max(1, LEAST_SIDE // min(shape))
+    return height * times, width * times
 
 
 def square_of_photograph(vertices: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.float32]:

@@ -43,6 +43,7 @@ def test_frames_show_the_photograph_from_above(good: Any) -> None:
     picture = store.open(Slot("photo_fur", "fur_frames", "square.grass"))["frames"].values[0]
     photo = store.open(Slot("photo_fur", "fur_photo", "grass"))["radiance"].values
     encoded = np.where(photo <= 0.0031308, 12.92 * photo, 1.055 * photo ** (1 / 2.4) - 0.055)
+    encoded = encoded.repeat(3, axis=0).repeat(3, axis=1)  # 128 pixels are shown as 384
     assert np.abs(picture / 255 - encoded).max() <= 0.5 / 255 + 1e-6
 
 
