@@ -206,7 +206,6 @@ def test_a_dropped_photograph_is_registered_and_its_run_makes_frames(dropped: An
     assert dropped.workspace.store.current(FUR.slot("fur_frames", keys))
     runs = {run.job_name for run in dropped.instance.get_runs()}
     assert {FUR.job_name(by) for by in FUR.grains()} <= runs
-    assert dropped.instance.get_run_partition_data is not None
     assert partition_key(keys) == f"{keys['mesh']}|{key}"
     # The same file again: nothing.
     assert _tick(dropped, tick.cursor).run_requests == []
