@@ -501,7 +501,7 @@ class FrameSettings(Settings):
 
 
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.photo_fur.pictures import contact_sheet
+    from pipelines.contact_sheet import contact_sheet
 
     return {"frames": contact_sheet(dataset["frames"].values)}
 

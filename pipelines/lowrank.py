@@ -1,0 +1,79 @@
+"""Low-rank factorisation of matrices too large to hold: principal components, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Blocks = Callable[[], Iterable[NDArray[np.floating]]]
+"""Starts a pass over a matrix (rows, columns): blocks (rows, some of the columns) from the left."""
+
+_OVERSAMPLING = 8
+
+
+class PrincipalComponents(NamedTuple):
+    """A matrix (rows, columns), its columns' means taken off, is about ``scores @ loadings.T``."""
+
+    scores: NDArray[np.float32]
+    """(rows, rank), orthogonal; the most important first."""
+    loadings: NDArray[np.float32]
+    """(columns, rank), orthonormal."""
+    singular_values: NDArray[np.float64]
+    """(rank,), the lengths of the scores."""
+
+
+def principal_components(
+    blocks: Blocks, rank: int, *, iterations: int = 2, seed: int = 0
+) -> PrincipalComponents:
+    """The ``rank`` largest principal components of the rows, in ``iterations + 2`` passes.
+
+    Randomised subspace iteration (Halko, Martinsson, Tropp 2011, algorithm 4.4) over blocks of
+    columns: memory is one block and a few (rows, rank) arrays. Singular values whose squares
+    decay slowly are found to a fraction of a per cent with two iterations. A matrix of lower rank
+    gives components of length 0. Signs are fixed: the largest entry of every loading is positive.
+
+    Raises ValueError where ``rank`` is not between 1 and the number of rows or columns.
+    """
+    random = np.random.default_rng(seed)
+    rows = columns = 0
+    sketch: NDArray[np.float64] | None = None
+    for block in blocks():
+        centred = _centred(block)
+        rows, columns = len(block), columns + block.shape[1]
+        width = min(rank + _OVERSAMPLING, rows)
+        directions = random.standard_normal((block.shape[1], width), dtype=np.float32)
+        part = (centred @ directions).astype(np.float64)
+        sketch = part if sketch is None else sketch + part
+    if sketch is None or not 1 <= rank <= min(rows, columns):
+        raise ValueError(
+            f"rank is {rank}; expected 1 to {min(rows, columns)} for a {rows} x {columns} matrix."
+        )
+    for _ in range(iterations):
+        basis = _orthonormal(sketch)
+        sketch = np.zeros_like(sketch)
+        for block in blocks():
+            centred = _centred(block)
+            sketch += centred @ (centred.T @ basis)
+    basis = _orthonormal(sketch)
+    projected = np.concatenate([_centred(block).T @ basis for block in blocks()])
+    left, lengths, right = np.linalg.svd(projected.astype(np.float64), full_matrices=False)
+    loadings, turned = left[:, :rank], right[:rank].T
+    signs = np.sign(loadings[np.abs(loadings).argmax(axis=0), np.arange(rank)])
+    signs[signs == 0] = 1.0
+    scores = (basis @ turned) * (lengths[:rank] * signs)
+    return PrincipalComponents(
+        scores.astype(np.float32), (loadings * signs).astype(np.float32), lengths[:rank]
+    )
+
+
+def _centred(block: NDArray[np.floating]) -> NDArray[np.float32]:
+    values = block.astype(np.float32)
+    values -= values.mean(axis=0, dtype=np.float64).astype(np.float32)
+    return values
+
+
+def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float32]:
+    return np.linalg.qr(columns)[0].astype(np.float32)

@@ -1,0 +1,203 @@
+"""The first bytes of a photograph's file: format, size, depth and channels, no pixel decoded.
+
+Read by hand, after PNG (third edition) 5.6 and 11.2.2, JPEG (ITU-T T.81) B.2 and the OpenEXR file
+layout: 6561 headers take a second so.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from storage.readers.bad_input import BadInput
+from storage.readers.btf_archives import Members
+from storage.readers.btf_measured import check_area
+from storage.readers.btf_radiance import SIGNATURE, radiance_header
+
+_EIGHT_BITS = "8-bit RGB"
+_PNG_CHANNELS = {0: "grey", 2: "RGB", 3: "palette", 4: "grey with alpha", 6: "RGB with alpha"}
+_JPEG_CHANNELS = {1: "grey", 3: "RGB", 4: "CMYK"}
+_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0 ... SOF15
+_EXR_TYPES = {0: "unsigned", 1: "half", 2: "float"}
+_EXR_NOT_FLAT = 0x800  # deep data
+_REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_CIE_XYZ = (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)
+
+
+class Header(NamedTuple):
+    """``format``: PNG, JPEG, EXR or HDR. ``pixels``: depth and channels in words, as in "8-bit RGB"
+    or "half CIE XYZ". ``planes``: an EXR's channels in the order of its colours.
+    """
+
+    format: str
+    width: int
+    height: int
+    pixels: str
+    planes: tuple[str, ...] = ()
+
+
+def common_header(members: Members, names: Sequence[str]) -> Header:
+    """Read every photograph's header and return the one that all share.
+
+    Raises BadInput naming the first file that differs from the others (from the most of them), or
+    that has a format, depth or channels that no database has.
+    """
+    headers = [_header(members, name) for name in names]
+    common = Counter(headers).most_common(1)[0][0]
+    for name, header in zip(names, headers, strict=True):
+        file = members.path / name
+        if header.format != common.format:
+            raise BadInput(file, "format", header.format, f"{common.format} as in the other files")
+        if header.format in ("PNG", "JPEG") and header.pixels != _EIGHT_BITS:
+            raise BadInput(file, "pixel format", header.pixels, _EIGHT_BITS)
+        if header.pixels != common.pixels or header.planes != common.planes:
+            raise BadInput(
+                file, "pixel format", header.pixels, f"{common.pixels} as in the other files"
+            )
+        if header != common:
+            raise BadInput(
+                file,
+                "size",
+                f"{header.width} x {header.height} pixels",
+                f"{common.width} x {common.height} pixels as in the other files",
+            )
+    check_area(members.path / names[0], common.width, common.height)
+    return common
+
+
+def header_of(file: Path, data: bytes) -> Header:
+    """The header in a file's first bytes.
+
+    Raises IndexError or struct.error where they do not reach, BadInput for other formats.
+    """
+    if data.startswith(b"\x89PNG\r\n\x1a\n"):
+        return _png(data)
+    if data.startswith(b"\xff\xd8\xff"):
+        return _jpeg(data)
+    if data.startswith(b"\x76\x2f\x31\x01"):
+        return _exr(file, data)
+    if data.startswith(SIGNATURE):
+        found = radiance_header(file, data)
+        return Header("HDR", found.width, found.height, "Radiance RGBE")
+    raise BadInput(
+        file,
+        "format",
+        "unknown" if data else "unknown (the file is empty)",
+        "a JPEG, PNG, EXR or Radiance photograph",
+    )
+
+
+def _header(members: Members, name: str) -> Header:
+    size = members.size(name)
+    for count in (4096, 1_000_000, size):  # a header with a thumbnail or a profile is longer
+        try:
+            return header_of(members.path / name, members.start(name, count))
+        except (IndexError, struct.error):
+            if count >= size:
+                break
+    raise BadInput(members.path / name, "content", "truncated or damaged", "a complete photograph")
+
+
+def _png(data: bytes) -> Header:
+    length, kind, width, height, depth, colour = struct.unpack_from(">I4sIIBB", data, 8)
+    if kind != b"IHDR":
+        raise IndexError("a PNG begins with its header chunk")
+    pixels = f"{depth}-bit {_PNG_CHANNELS.get(colour, 'unknown')}"
+    at = 8
+    while kind != b"IDAT":
+        at += 12 + length
+        length, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"tRNS":
+            pixels += " with transparency"
+    return Header("PNG", width, height, pixels)
+
+
+def _jpeg(data: bytes) -> Header:
+    at = 2
+    while True:
+        if data[at] != 0xFF:
+            raise IndexError("a marker is missing")
+        marker = data[at + 1]
+        if marker == 0xFF:  # padding
+            at += 1
+            continue
+        (length,) = struct.unpack_from(">H", data, at + 2)
+        if marker in _JPEG_FRAMES:
+            depth, height, width, channels = struct.unpack_from(">BHHB", data, at + 4)
+            pixels = f"{depth}-bit {_JPEG_CHANNELS.get(channels, f'{channels} channels')}"
+            return Header("JPEG", width, height, pixels)
+        if marker in (0xD9, 0xDA):  # end, or the scan: the frame had to come before
+            raise IndexError("a frame is missing")
+        at += 2 + length
+
+
+def _exr(file: Path, data: bytes) -> Header:
+    """Of a file with several parts the first."""
+    (flags,) = struct.unpack_from("<I", data, 4)
+    if flags & _EXR_NOT_FLAT:
+        raise BadInput(file, "pixel format", "deep", "half or float channels")
+    attributes: dict[bytes, bytes] = {}
+    at = 8
+    while data[at]:
+        name, at = _exr_text(data, at)
+        _, at = _exr_text(data, at)
+        (size,) = struct.unpack_from("<I", data, at)
+        at += 4 + size
+        if at >= len(data):
+            raise IndexError("the header goes on")
+        attributes[name] = data[at - size : at]
+    left, top, right, bottom = struct.unpack("<4i", attributes.get(b"dataWindow", b""))
+    names, sample_type = _exr_channels(file, attributes.get(b"channels", b""))
+    space = _exr_space(file, names, attributes.get(b"chromaticities"))
+    return Header(
+        "EXR", max(right - left + 1, 0), max(bottom - top + 1, 0), f"{sample_type} {space}", names
+    )
+
+
+def _exr_text(data: bytes, at: int) -> tuple[bytes, int]:
+    end = data.index(b"\0", at) if b"\0" in data[at : at + 256] else -1
+    if end < 0:
+        raise IndexError("a name does not end")
+    return data[at:end], end + 1
+
+
+def _exr_channels(file: Path, chlist: bytes) -> tuple[tuple[str, ...], str]:
+    found: dict[str, tuple[int, int, int]] = {}
+    at = 0
+    while chlist[at]:
+        name, at = _exr_text(chlist, at)
+        sample_type, across, down = struct.unpack_from("<i4xii", chlist, at)
+        found[name.decode("latin-1")] = (sample_type, across, down)
+        at += 16
+    for names in (("X", "Y", "Z"), ("R", "G", "B")):
+        if set(names) == found.keys():
+            break
+    else:
+        raise BadInput(
+            file, "channels", ", ".join(sorted(found)[:8]) or "none", "X, Y, Z or R, G, B alone"
+        )
+    kinds = set(found.values())
+    if kinds not in ({(1, 1, 1)}, {(2, 1, 1)}):
+        types = ", ".join(sorted(_EXR_TYPES.get(kind[0], "unknown") for kind in kinds))
+        raise BadInput(
+            file, "channels", f"not alike or {types}", "half or float channels of one type and size"
+        )
+    return names, _EXR_TYPES[kinds.pop()[0]]
+
+
+def _exr_space(file: Path, names: tuple[str, ...], chromaticities: bytes | None) -> str:
+    """X, Y, Z are named; R, G, B are CIE XYZ too where the attribute says so (OpenEXR's way)."""
+    if names == ("X", "Y", "Z"):
+        return "CIE XYZ"
+    found = struct.unpack("<8f", chromaticities) if chromaticities is not None else _REC709
+    if np.allclose(found, _REC709, atol=2e-3):
+        return "RGB"
+    if np.allclose(found, _CIE_XYZ, atol=2e-3):
+        return "CIE XYZ"
+    text = ", ".join(f"{value:.4g}" for value in found)
+    raise BadInput(file, "chromaticities", text, "those of sRGB or of CIE XYZ")
