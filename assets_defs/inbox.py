@@ -81,7 +81,7 @@ def take_in(
     taken by other content gets digits of its hash. Raises ValueError for a file that cannot be
     used; then nothing is copied.
     """
-    if path.suffix.lower() not in dimension.suffixes:
+    if path.suffix.lower() not in dimension.suffixes and not (dimension.folders and path.is_dir()):
         raise ValueError(
             f"{path.name}: ending is {path.suffix!r}; expected one of "
             f"{', '.join(dimension.suffixes)}."
@@ -98,17 +98,23 @@ def take_in(
     if not target.exists():
         inbox.mkdir(parents=True, exist_ok=True)
         beside = target.with_name(f".{target.name}.part")
-        shutil.copyfile(path, beside)
+        if path.is_dir():
+            shutil.rmtree(beside, ignore_errors=True)
+            shutil.copytree(path, beside)
+        else:
+            shutil.copyfile(path, beside)
         os.replace(beside, target)
     return key
 
 
 def _stamp(path: Path) -> str | None:
-    """Size and time of a file; None while it may still be on its way."""
-    status = path.stat()
-    if time.time() - status.st_mtime < SETTLED_SECONDS:
+    """Size and time of a file, or of all in a folder; None while it may still be on its way."""
+    inside = path.rglob("*") if path.is_dir() else ()
+    statuses = [path.stat(), *(file.stat() for file in inside)]
+    newest = max(status.st_mtime_ns for status in statuses)
+    if time.time() - newest / 1e9 < SETTLED_SECONDS:
         return None
-    return f"{status.st_size}:{status.st_mtime_ns}"
+    return f"{sum(status.st_size for status in statuses)}:{newest}"
 
 
 def _request(

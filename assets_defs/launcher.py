@@ -101,14 +101,10 @@ class Launcher:
 
     def _plan(self, request: Request) -> list[tuple[tuple[str, ...], dict[str, str]]]:
         system = request.system
+        inbox = self.workspace.inbox(system.name)
         for dimension in system.dimensions:
-            sources = system.sources(dimension.name, self.workspace.inbox(system.name))
             for key in _keys(request, dimension.name):
-                if key not in sources:
-                    raise ValueError(
-                        f"{dimension.name} {key!r} is not known; "
-                        f"expected one of {', '.join(sources)}."
-                    )
+                system.source(dimension.name, key, inbox)
         check_settings(system, request.preset, request.given)
         planned = [
             (by, keys) for by in system.grains() for keys in _projections(request.partitions, by)
@@ -116,9 +112,19 @@ class Launcher:
         for by, keys in planned:
             for plan in self._grain_plans(system, by):
                 settings = self._settings(request, plan, keys)
-                source = system.source_of(plan, keys, self.workspace.inbox(system.name))
+                source = system.source_of(plan, keys, inbox)
                 if source is not None:
                     system.dimension(*by).check(source, settings.model_dump())
+        if system.check is not None:
+            for asked in request.partitions:
+                system.check(
+                    {name: system.source(name, key, inbox) for name, key in asked.items()},
+                    {
+                        plan.name: self._settings(request, plan, asked)
+                        for plan in system.plans.values()
+                        if set(plan.by) <= set(asked)
+                    },
+                )
         return planned
 
     def _run_grain(

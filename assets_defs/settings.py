@@ -82,7 +82,7 @@ def _plain_type(annotation: Any) -> Any:
     """The type as Dagster's config system knows it."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Literal:
-        return str
+        return type(arguments[0])
     if origin is tuple:
         return list[arguments[0]]  # type: ignore[valid-type]
     if origin in (Union, UnionType):

@@ -25,6 +25,7 @@ from assets_defs.pictures import thumbnail
 from assets_defs.settings import Settings, config_class, resolve
 from assets_defs.workspace import Workspace
 from storage.errors import SchemaError
+from storage.io_manager import INTERRUPTED
 from storage.schemas import Schema
 from storage.slugs import slug
 from storage.versions import WHOLE, Slot, VersionedStore
@@ -42,8 +43,6 @@ Progress = Callable[[str, float], None]
 """Told what is being done and the fraction that is done."""
 
 RETRIES = dg.RetryPolicy(max_retries=2, delay=1)
-INTERRUPTED = "interrupted"
-"""Why a run failed that a person stopped."""
 OWNERS = ("team:tsuya",)
 
 
@@ -56,7 +55,9 @@ class Source:
 
     @classmethod
     def of(cls, path: Path) -> Source:
-        """A file; its ending is part of the key, so `fur.png` and `fur.jpg` are two sources."""
+        """A file or a folder; its ending is part of the key: `fur.png`, `fur.jpg` are two."""
+        if path.is_dir():
+            return cls(slug(f"{path.name}-folder"), path)
         return cls(slug(f"{path.stem}-{path.suffix[1:]}"), path)
 
     @property
@@ -66,9 +67,14 @@ class Source:
 
     @property
     def fingerprint(self) -> str:
-        """Hash of the file's bytes; of a built-in item, its key."""
+        """Hash of the file's bytes, or of all files in the folder; of a built-in item, its key."""
         if self.path is None:
             return f"built-in:{self.key}"
+        if self.path.is_dir():
+            inside = sorted(path for path in self.path.rglob("*") if path.is_file())
+            return _hash(
+                [[str(p.relative_to(self.path)), Source("", p).fingerprint] for p in inside]
+            )
         with self.path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -88,6 +94,15 @@ class Dimension:
     """Endings of this dimension's files in the inbox, lower case."""
     check: Callable[[Source, Mapping[str, Any]], object]
     """Raises ValueError for a source that cannot be used with these settings of its asset."""
+    folders: bool = False
+    """Whether a folder in the inbox is an item, too."""
+    numbers: bool = False
+    """Whether every positive whole number is a key that needs no file."""
+
+    def needs_no_file(self, key: str) -> bool:
+        """Whether a key is built in, or a number where numbers are keys."""
+        is_number = key.isdecimal() and key == str(int(key)) and int(key) > 0
+        return key in self.builtin or (self.numbers and is_number)
 
 
 @dataclass(frozen=True)
@@ -116,6 +131,9 @@ class System:
     name: str
     title: str
     dimensions: tuple[Dimension, ...]
+    check: Callable[[Mapping[str, Source], Mapping[str, Settings]], object] | None = None
+    """Raises ValueError for sources, by dimension, that cannot go together with these settings, by
+    asset. Asked before any work."""
     plans: dict[str, AssetPlan] = field(default_factory=dict)
     """In the order of declaration: inputs come before what is made from them."""
     assets: list[dg.AssetsDefinition] = field(default_factory=list)
@@ -151,12 +169,30 @@ class System:
         dropped = (Source.of(path) for path in self.files(dimension, inbox))
         return builtin | {source.key: source for source in dropped}
 
+    def source(self, dimension: str, key: str, inbox: Path) -> Source:
+        """The source that a key names. Raises ValueError where there is none."""
+        sources = self.sources(dimension, inbox)
+        if key in sources:
+            return sources[key]
+        declared = self.dimension(dimension)
+        if declared.needs_no_file(key):
+            return Source(key, None)
+        number = ", or a whole number" if declared.numbers else ""
+        raise ValueError(
+            f"{dimension} {key!r} is not known; expected one of {', '.join(sources)}{number}."
+        )
+
     def files(self, dimension: str, inbox: Path) -> list[Path]:
-        """The dimension's files in the inbox."""
-        suffixes = self.dimension(dimension).suffixes
+        """The dimension's files, or folders, in the inbox."""
+        declared = self.dimension(dimension)
         if not inbox.is_dir():
             return []
-        return sorted(p for p in inbox.iterdir() if p.suffix.lower() in suffixes)
+        return sorted(
+            path
+            for path in inbox.iterdir()
+            if path.suffix.lower() in declared.suffixes
+            or (declared.folders and path.is_dir() and not path.name.startswith("."))
+        )
 
     def span(self, wanted: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
         """The cross product of keys by dimension."""
@@ -175,7 +211,10 @@ class System:
             if slot.system == self.name and slot.asset in self.plans:
                 by = sorted(self.plans[slot.asset].by)
                 keys = dict(zip(by, slot.partition.split("."), strict=True))
-                if all(key in known[name] for name, key in keys.items()):
+                if all(
+                    key in known[name] or self.dimension(name).needs_no_file(key)
+                    for name, key in keys.items()
+                ):
                     found.append(keys)
         return found
 
@@ -215,13 +254,7 @@ class System:
         if not plan.from_source:
             return None
         (dimension,) = plan.by
-        sources = self.sources(dimension, inbox)
-        if keys[dimension] not in sources:
-            raise ValueError(
-                f"{inbox}: {dimension} {keys[dimension]!r} is not there; "
-                f"expected one of {', '.join(sources)}."
-            )
-        return sources[keys[dimension]]
+        return self.source(dimension, keys[dimension], inbox)
 
     # ---- assets ------------------------------------------------------------------------------
 
@@ -240,8 +273,9 @@ class System:
         """Declare an asset; the decorated function stays callable by itself.
 
         It is called with ``settings``, then whichever it names of ``source`` (for an asset made
-        from one), ``keys`` (the partition), ``progress`` (a function of the fraction done) and
-        its inputs, and returns ``(dataset, metadata)``.
+        from one), ``keys`` (the partition), ``progress`` (a function of the fraction done),
+        ``work`` (where state is kept that outlives a killed process) and its inputs, and returns
+        ``(dataset, metadata)``.
         """
 
         def declare(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -320,11 +354,15 @@ class System:
             what = f"{plan.name} [{', '.join(keys.values())}]"
             progress = functools.partial(context.resources.progress, what)
             progress(0.0)
+            records = {name: data.attrs[RECORD] for name, data in inputs.items()}
+            fingerprint = source.fingerprint if source else None
+            made_of = provenance(plan, settings, fingerprint, records)
             offered = {
                 "settings": settings,
                 "source": source,
                 "keys": keys,
                 "progress": progress,
+                "work": workspace.store.work(self.slot(plan.name, keys), made_of["recipe"]),
                 **inputs,
             }
             named = inspect.signature(function).parameters
@@ -335,8 +373,7 @@ class System:
         except (ValueError, SchemaError) as error:
             # What the user gave cannot work: a second try would not either.
             raise dg.Failure(description=str(error), allow_retries=False) from error
-        records = {name: data.attrs[RECORD] for name, data in inputs.items()}
-        record = provenance(plan, settings, source.fingerprint if source else None, records) | {
+        record = made_of | {
             "run": context.run.run_id,
             "checks": [check.name for check in plan.checks],
         }

@@ -16,6 +16,9 @@ from storage.zarr_files import RECORD, stored_bytes
 if TYPE_CHECKING:
     import xarray as xr
 
+INTERRUPTED = "interrupted"
+"""Why a run failed that a person stopped."""
+
 
 class ZarrIOManager(dg.IOManager):
     """Writes what an asset returns as a new version; opens the current version for what needs it.
@@ -31,7 +34,14 @@ class ZarrIOManager(dg.IOManager):
         slot = _slot(context)
         record = dataset.attrs.pop(RECORD)
         schema = find_schema(slot.system, slot.asset)
-        written = self.store.write(slot, schema.conform(dataset), record)
+        try:
+            written = self.store.write(slot, schema.conform(dataset), record)
+        except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
+            # Left to itself, Dagster would take the interruption for trouble and try again.
+            raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
+        except ValueError as error:
+            # A lazy dataset's file turned out to be damaged: a second try would not help.
+            raise dg.Failure(description=str(error), allow_retries=False) from error
         folder = self.store.folder(slot, written.version)
         data_version = dg.DataVersion(written.content)
         # Internal to Dagster, and the only way to set it from an IO manager: pinned, tested.

@@ -5,6 +5,7 @@
         versions/<version>/    Zarr v3 groups, never changed once they are here
         verdicts/<version>.json  what the checks said of a version, with their figures
         staging/               versions being written; a killed writer leaves its piece here
+        work/                  state of long work, to go on from after a kill
         lock                   held for the milliseconds in which the pointer is replaced
 
 A new version is a *candidate* until every blocking check of its asset has passed it; then it is
@@ -30,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 from storage import zarr_files
 from storage.errors import NoVersionError, StoreError
+from storage.work_state import WorkState
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,6 +189,7 @@ class VersionedStore:
             )
             zarr_files.sync(staged)
             written = self._publish(slot, staged, Written(version, content, True))
+            shutil.rmtree(self._folder(slot) / "work", ignore_errors=True)
         except OSError as error:
             raise zarr_files.disk_error(error, staged) from error
         finally:
@@ -222,6 +225,10 @@ class VersionedStore:
         except StoreError:
             return False  # Damaged by hand: what is written now takes its place.
         return all(now[name] == record[name] for name in ("content", "settings"))
+
+    def work(self, slot: Slot, recipe: str) -> WorkState:
+        """Where work on a version of this recipe keeps its state until the version is written."""
+        return WorkState(self._folder(slot) / "work", recipe[:16])
 
     # ---- verdicts ----------------------------------------------------------------------------
 

@@ -96,8 +96,7 @@ def _run_command(system: System) -> click.Command:
         click.Option(
             [f"--{dimension.name}"],
             multiple=True,
-            help=f"A file ({', '.join(dimension.suffixes)}) or one of "
-            f"{', '.join(dimension.builtin)}; may be repeated. "
+            help=f"{_what_may_be_given(dimension)}; may be repeated. "
             f"Default: {', '.join(dimension.examples)}.",
         )
         for dimension in system.dimensions
@@ -120,6 +119,16 @@ def _run_command(system: System) -> click.Command:
         params=options,
         help=f"{system.title}. Settings: {', '.join(names)}.",
     )
+
+
+def _what_may_be_given(dimension: Dimension) -> str:
+    folders = ", a folder" if dimension.folders else ""
+    file = (
+        f"A file ({', '.join(dimension.suffixes)}){folders} or one of "
+        if dimension.suffixes
+        else ""
+    )
+    return f"{file}{', '.join(dimension.builtin)}{', a number' if dimension.numbers else ''}"
 
 
 for _system in SYSTEMS.values():
@@ -202,7 +211,7 @@ def _key(
 ) -> str:
     """The key of a built-in or registered item; a file is taken into the inbox."""
     known = system.sources(dimension.name, session.workspace.inbox(system.name))
-    if item in known:
+    if item in known or dimension.needs_no_file(item):
         return item
     if not Path(item).exists():
         raise ValueError(
