@@ -531,7 +531,7 @@ class NetworkSettings(Settings):
         "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
     )
     steps: int = Field(600, ge=1, description="Fast: steps of gradient descent")
-    rate: float = Field(0.02, gt=0.0, le=1.0, description="Fast: largest learning rate")
+    rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
     batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
     batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
     warm_start: Literal["pca", "encoder", "random"] = Field(
@@ -558,7 +558,7 @@ class NetworkSettings(Settings):
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"steps": 120, "batch_images": 64, "encoder_steps": 10, "paper_steps": 30},
-        "paper": {"steps": 24_000, "encoder_steps": 400, "paper_steps": 200_000},
+        "paper": {"steps": 16_000, "encoder_steps": 300, "paper_steps": 200_000},
     }
 
 

@@ -1,16 +1,18 @@
-"""Run one benchmark: ``python -m benchmarks fur``."""
+"""Run one benchmark: ``python -m benchmarks fur``, ``python -m benchmarks btf --scale paper``."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
+import inspect
 import json
 import platform
 import subprocess
 from pathlib import Path
 from typing import Any
 
-NAMES = ("fur",)
+NAMES = ("btf", "fur")
+SCALES = ("default", "paper")
 
 
 def machine() -> dict[str, Any]:
@@ -40,8 +42,14 @@ def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks")
     parser.add_argument("name", choices=NAMES)
+    parser.add_argument(
+        "--scale", choices=SCALES, default="default", help="paper: an hour, where there is one"
+    )
     arguments = parser.parse_args()
-    figures = importlib.import_module(f"benchmarks.{arguments.name}").run()
+    run = importlib.import_module(f"benchmarks.{arguments.name}").run
+    if "scale" not in inspect.signature(run).parameters and arguments.scale != "default":
+        parser.error(f"{arguments.name} has no scale {arguments.scale!r}; expected 'default'.")
+    figures = run(arguments.scale) if "scale" in inspect.signature(run).parameters else run()
     print(json.dumps(figures | {"commit": commit(), "machine": machine()}))
 
 

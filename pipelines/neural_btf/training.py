@@ -44,8 +44,6 @@ _WARM_UP = 0.05
 _STEPS_A_PART = 500
 _ENCODE_ROWS = 64
 _ENCODER_RATE = 2e-3
-_MUON_RATE = 2.5
-"""Of the hidden layers' matrices, in units of the other parameters' rate."""
 _STAGE_NUMBER = {"paper": 0, "encoder": 1, "latents": 2, "distil": 3}
 
 
@@ -261,7 +259,7 @@ class Trainer:
             others = [part for part in decoder if all(part is not matrix for matrix in hidden)]
             self._optimisers = [
                 _adam([*others, self.latents], self._plan.rate),
-                torch.optim.Muon(hidden, lr=_MUON_RATE * self._plan.rate, weight_decay=0.0),
+                torch.optim.Muon(hidden, lr=self._plan.rate, weight_decay=0.0),
             ]
         self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
 

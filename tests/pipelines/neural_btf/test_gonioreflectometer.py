@@ -228,7 +228,7 @@ def test_energy_and_bounces(yarns: Cloth) -> None:
     assert reflected(0.5, 0.15, 1) < reflected(1, 0.15, 0) < reflected(1, 0.15, 1) <= 1
     matt = [reflected(1, 0, bounces) for bounces in (0, 1, 2, 20)]
     assert matt == sorted(matt)
-    assert 0.95 < matt[-1] < 1.01  # all comes out in the end, but for vertices within yarns
+    assert 0.93 < matt[-1] < 1.01  # all comes out in the end, but for vertices within yarns
 
 
 def test_more_samples_converge(yarns: Cloth) -> None:
