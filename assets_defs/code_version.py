@@ -1,9 +1,9 @@
 """Code versions that nobody has to remember to raise.
 
-An asset's code version is the hash of its own function, of its module's functions and constants
-(numbers, texts, tuples of them) that it names, and of every module of `pipelines` and of
-`storage.readers` that it imports, directly or through others. The hash is over syntax trees without
-docstrings: a comment or a docstring changes no version.
+An asset's code version is the hash of its own function, of the functions and constants (numbers,
+texts, tuples of them) that it names in its module or in its system's package, and of every module
+of `pipelines` and of `storage.readers` that it imports, directly or through others. The hash is
+over syntax trees without docstrings: a comment or a docstring changes no version.
 """
 
 from __future__ import annotations
@@ -47,10 +47,17 @@ def _gather(function: Callable[..., Any], own: dict[str, str], modules: set[str]
         home = getattr(value, "__name__" if inspect.ismodule(value) else "__module__", None)
         if isinstance(home, str) and home.startswith(_HASHED_PACKAGES):
             modules |= _reached(home)
-        elif inspect.isfunction(value) and home == function.__module__:
+        elif inspect.isfunction(value) and _is_near(home, function.__module__):
             _gather(value, own, modules)
         elif _is_name(node) and _is_constant(value):
             own[f"{function.__module__}.{node.id}"] = repr(value)
+
+
+def _is_near(home: str | None, module: str) -> bool:
+    """Whether a function's home is the module itself, or one of its system's package."""
+    package = module.rpartition(".")[0]
+    own_package = package.count(".") > 0 and str(home).startswith(f"{package}.")
+    return home == module or own_package
 
 
 def _is_name(node: ast.AST) -> TypeGuard[ast.Name]:

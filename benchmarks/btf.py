@@ -30,16 +30,10 @@ from rich.console import Console
 
 from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, Request
-from assets_defs.neural_btf import (
-    BTF,
-    NONE,
-    NetworkSettings,
-    compressed,
-    packed,
-    payload_bytes,
-    training_data,
-    training_plan,
-)
+from assets_defs.neural_btf import BTF
+from assets_defs.neural_btf.datasets import compressed, payload_bytes
+from assets_defs.neural_btf.declaration import NONE
+from assets_defs.neural_btf.network import NetworkSettings, packed, training_data, training_plan
 from assets_defs.workspace import CHECKOUT, Workspace
 from pipelines.directions import Pairs, all_pairs, hemisphere_table
 from pipelines.lowrank import principal_components
@@ -91,7 +85,7 @@ def _launcher(root: Path) -> Iterator[Launcher]:
 
     def heard(what: str, fraction: float) -> None:
         if fraction == 0.0:
-            _console.print(f"  {what}", highlight=False)
+            _console.print(f"  {what}", markup=False, highlight=False)
 
     definitions = build_definitions(workspace, {"progress": heard})
     with dg.DagsterInstance.ephemeral() as instance:
@@ -232,7 +226,13 @@ def _default_scale() -> dict[str, Any]:
         store = launcher.workspace.store
         with _timed("photographs to restored photographs"):
             keys = [{"material": SMALL_MATERIAL, "clusters": c} for c in (NONE, str(clusters))]
-            given = {"texels": SMALL_TEXELS, "steps": 3000, "width": 160, "frames": 2}
+            given = {
+                "texels": SMALL_TEXELS,
+                "directions": 81,
+                "steps": 3000,
+                "width": 160,
+                "frames": 2,
+            }
             outcomes = launcher.launch(Request(BTF, keys, "demo", given))
         figures["seconds_small"] = {str(o.slot): round(o.seconds, 1) for o in outcomes}
         for name, column in (("none", NONE), ("clustered", str(clusters))):

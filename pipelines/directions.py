@@ -24,9 +24,13 @@ _BONN_2014: Sequence[_Ring] = (
     (0.0, 1, 0.0), (11.0, 6, 15.0), (23.5, 12, 0.0), (30.0, 12, 15.0), (37.5, 12, 0.0),
     (45.0, 18, 0.0), (52.5, 18, 7.5), (60.0, 24, 0.0), (67.5, 24, 7.5), (75.0, 24, 0.0),
 )  # fmt: skip
+_HALF: Sequence[_Ring] = (
+    (0.0, 1, 0.0), (15.0, 6, 0.0), (30.0, 6, 0.0), (45.0, 6, 0.0), (60.0, 10, 0.0),
+    (75.0, 12, 0.0),
+)  # fmt: skip
 _COARSE: Sequence[_Ring] = ((0.0, 1, 0.0), (30.0, 6, 0.0), (60.0, 8, 0.0))
 
-_TABLES = {15: _COARSE, 81: _BONN_2003, 151: _BONN_2014}
+_TABLES = {15: _COARSE, 41: _HALF, 81: _BONN_2003, 151: _BONN_2014}
 
 
 class Pairs(NamedTuple):
@@ -39,8 +43,8 @@ class Pairs(NamedTuple):
 def hemisphere_table(count: int) -> NDArray[np.float64]:
     """Directions (count, 2) of a goniometer, ring by ring, radians.
 
-    81 are those of UBO2003, ATRIUM and UTIA, 151 those of UBO2014; 15 are a coarse table of our
-    own for quick looks. Raises ValueError for another count.
+    81 are those of UBO2003, ATRIUM and UTIA, 151 those of UBO2014; 41 are about half of the 81,
+    and 15 a coarse table for quick looks. Raises ValueError for another count.
     """
     if count not in _TABLES:
         known = ", ".join(map(str, _TABLES))
@@ -55,9 +59,7 @@ def hemisphere_table(count: int) -> NDArray[np.float64]:
 
 def all_pairs(views: NDArray[np.float64], lights: NDArray[np.float64]) -> Pairs:
     """Every view (V, 2) with every light (L, 2), as V * L pairs."""
-    return Pairs(
-        light=np.tile(lights, (len(views), 1)), view=np.repeat(views, len(lights), axis=0)
-    )
+    return Pairs(light=np.tile(lights, (len(views), 1)), view=np.repeat(views, len(lights), axis=0))
 
 
 def unit_vectors(directions: ArrayLike) -> NDArray[np.float64]:
