@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 Metadata = Mapping[str, Any]
 Pictures = Callable[["xr.Dataset"], "Mapping[str, NDArray[np.uint8]]"]
 """Pictures (y, x, 3) of a dataset by name, for the web UI and the gallery."""
+Overview = Callable[[VersionedStore, Sequence[Slot]], "Mapping[str, NDArray[np.uint8]]"]
+"""Pictures (y, x, 3), or moving ones (frame, y, x, 3), by name, of the slots that have some."""
 Progress = Callable[[str, float], None]
 """Told what is being done and the fraction that is done."""
 
@@ -134,6 +136,8 @@ class System:
     check: Callable[[Mapping[str, Source], Mapping[str, Settings]], object] | None = None
     """Raises ValueError for sources, by dimension, that cannot go together with these settings, by
     asset. Asked before any work."""
+    overview: Overview | None = None
+    """Pictures of several partitions together, for the gallery."""
     plans: dict[str, AssetPlan] = field(default_factory=dict)
     """In the order of declaration: inputs come before what is made from them."""
     assets: list[dg.AssetsDefinition] = field(default_factory=list)

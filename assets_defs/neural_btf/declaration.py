@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -11,6 +11,11 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.system import Dimension, Source, System
 from pipelines.neural_btf.virtual_cloth import MATERIALS
 from storage.readers.btf import open_btf
+from storage.versions import Slot, VersionedStore
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 NONE = "none"
 """The column of the tables without clusters: every texel has its own latents."""
@@ -61,6 +66,22 @@ def _check_clusters(sources: Mapping[str, Source], settings: Mapping[str, Settin
         )
 
 
+def _wall(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
+    """The materials side by side under the moving light, one wall for each number of clusters."""
+    from pipelines.neural_btf.pictures import wall
+
+    found: dict[str, list[NDArray[np.uint8]]] = {}
+    for slot in slots:
+        if slot.system == BTF.name and slot.asset == "cloth_frames":
+            clusters = slot.partition.partition(".")[0]
+            found.setdefault(clusters, []).append(store.open(slot)["frames"].values)
+    return {
+        f"wall-{clusters}": wall(panels)
+        for clusters, panels in found.items()
+        if len(panels) > 1 and len({panel.shape for panel in panels}) == 1
+    }
+
+
 BTF = System(
     name="neural_btf",
     title="BTFs compressed by a neural network",
@@ -85,4 +106,5 @@ BTF = System(
         ),
     ),
     check=_check_clusters,
+    overview=_wall,
 )

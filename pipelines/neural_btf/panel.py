@@ -105,7 +105,7 @@ def draw_frames(
     """
     panel = folded_panel(tiles, compressed.height / compressed.width)
     height, s = width * 3 // 4, supersampling
-    camera = orbit((0.0, 0.0, 0.0), 3.6, -90.0, 62.0, view_angle=27.0)
+    camera = orbit((0.0, 0.0, 0.0), 3.6, -90.0, 62.0, view_angle=24.0)
     size = (width * s, height * s)
     drawn = {
         name: _draw(panel, values, camera, size)

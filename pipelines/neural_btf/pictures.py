@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.colour import to_8bit
+from pipelines.contact_sheet import contact_sheet
 from pipelines.directions import Pairs, angles_between, unit_vectors
 
 _AIM = 0.8
@@ -122,6 +123,11 @@ def error_picture(
         axis.set_axis_off()
         figure.colorbar(points, ax=axis)
     return _drawn(canvas)
+
+
+def wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Moving pictures (frame, y, x, 3) of several materials as one, in two rows."""
+    return np.stack([contact_sheet(np.stack(frames)) for frames in zip(*panels, strict=True)])
 
 
 def _words(direction: NDArray[np.floating]) -> str:
