@@ -32,8 +32,8 @@ from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, Request
 from assets_defs.neural_btf import BTF
 from assets_defs.neural_btf.datasets import compressed, payload_bytes
-from assets_defs.neural_btf.declaration import NONE
-from assets_defs.neural_btf.network import NetworkSettings, packed, training_data, training_plan
+from assets_defs.neural_btf.declaration import NONE, NetworkSettings
+from assets_defs.neural_btf.network import packed, training_data, training_plan
 from assets_defs.workspace import CHECKOUT, Workspace
 from pipelines.directions import Pairs, all_pairs, hemisphere_table
 from pipelines.lowrank import principal_components

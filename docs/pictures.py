@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
+from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from storage.versions import VersionedStore
 
@@ -22,13 +24,24 @@ def make_pictures(store: VersionedStore) -> None:
     frames = {name: _frames(store, "teapot-large", name) for name in ("grass", "chelsea", "pelt")}
     _row(
         "fur.jpg",
-        _shown(store, "fur_photo", {"photo": "pelt"}),
-        _shown(store, "shell_stack", {"photo": "pelt"}),
+        _shown(store, FUR, "fur_photo", {"photo": "pelt"}),
+        _shown(store, FUR, "shell_stack", {"photo": "pelt"}),
         frames["pelt"][0],
     )
     _row("fur-square.jpg", *_frames(store, "square", "pelt"))
     _row("fur-three.jpg", *(pictures[0] for pictures in frames.values()))
-    _row("fur-decay.png", _shown(store, "attenuation", {"photo": "pelt"}))
+    _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
+    materials = BTF.dimension("material").examples
+    _column(
+        "btf-photographs.png",
+        *(_shown(store, BTF, "btf_images", {"material": material}) for material in materials),
+    )
+    knit = {"material": "knit", "clusters": "100"}
+    for name in ("restored", "errors"):
+        Image.fromarray(_shown(store, BTF, "restored_images", knit, name)).save(
+            FOLDER / f"btf-{name}.png", optimize=True
+        )
+    _moving("btf-wall.webp", _wall(store))
 
 
 def _frames(store: VersionedStore, mesh: str, photo: str) -> NDArray[np.uint8]:
@@ -36,11 +49,31 @@ def _frames(store: VersionedStore, mesh: str, photo: str) -> NDArray[np.uint8]:
     return np.asarray(frames.values)
 
 
-def _shown(store: VersionedStore, asset: str, keys: dict[str, str]) -> NDArray[np.uint8]:
-    pictures = FUR.plans[asset].pictures
+def _shown(
+    store: VersionedStore, system: System, asset: str, keys: dict[str, str], name: str | None = None
+) -> NDArray[np.uint8]:
+    """An asset's picture; its only one where no name is given."""
+    pictures = system.plans[asset].pictures
     assert pictures is not None
-    (picture,) = pictures(store.open(FUR.slot(asset, keys))).values()
-    return picture
+    made = pictures(store.open(system.slot(asset, keys)))
+    if name is None:
+        (name,) = made
+    return made[name]
+
+
+def _wall(store: VersionedStore) -> NDArray[np.uint8]:
+    assert BTF.overview is not None
+    return BTF.overview(store, list(store.slots()))["wall-none"]
+
+
+def _moving(name: str, frames: NDArray[np.uint8]) -> None:
+    first, *others = (Image.fromarray(frame) for frame in frames)
+    first.save(FOLDER / name, save_all=True, append_images=others, duration=400, loop=0, quality=75)
+
+
+def _column(name: str, *pictures: NDArray[np.uint8]) -> None:
+    """Pictures of one width below each other."""
+    Image.fromarray(np.vstack(pictures)).save(FOLDER / name, optimize=True)
 
 
 def _row(name: str, *pictures: NDArray[np.uint8]) -> None:

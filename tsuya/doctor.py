@@ -30,6 +30,7 @@ def examine(picture: Path) -> list[Finding]:
         ("set up by `make setup`", _set_up),
         ("folder for data", _data),
         ("ray casting (Open3D with Embree)", _rays),
+        ("training (PyTorch)", _training),
         ("drawing without a screen", lambda: _drawing(picture)),
     )
     findings = []
@@ -74,6 +75,13 @@ def _rays() -> str:
             "sudo apt-get install libusb-1.0-0 libgomp1"
         ) from error
     return f"Open3D {open3d.__version__}"
+
+
+def _training() -> str:
+    import torch
+
+    card = torch.cuda.get_device_name() if torch.cuda.is_available() else "no graphics card"
+    return f"PyTorch {torch.__version__}, {card}"
 
 
 def _drawing(picture: Path) -> str:

@@ -45,7 +45,6 @@ def _write(picture: NDArray[np.uint8], stem: Path) -> Path:
         return path
     path = stem.parent / f"{stem.name}.webp"
     first, *others = (Image.fromarray(frame) for frame in picture)
-    first.save(
-        path, save_all=True, append_images=others, duration=_MILLISECONDS_A_FRAME, loop=0, quality=80
-    )
+    pace = _MILLISECONDS_A_FRAME
+    first.save(path, save_all=True, append_images=others, duration=pace, loop=0, quality=80)
     return path

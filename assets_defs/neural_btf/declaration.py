@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -40,6 +41,46 @@ class ImageSettings(Settings):
     }
 
 
+class NetworkSettings(Settings):
+    """How the network is trained."""
+
+    training: Literal["fast", "paper"] = Field(
+        "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
+    )
+    steps: int = Field(600, ge=1, description="Fast: steps of gradient descent")
+    rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
+    batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
+    batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
+    warm_start: Literal["pca", "encoder", "random"] = Field(
+        "pca", description="Fast: where the latents start"
+    )
+    encoder_share: float = Field(
+        0.25, ge=0.0, le=1.0, description="Warm start encoder: share of the steps through it"
+    )
+    encoder_steps: int = Field(
+        60, ge=0, description="Fast: steps of fitting the encoder to the latents at the end"
+    )
+    paper_steps: int = Field(2000, ge=1, description="Paper: steps of gradient descent")
+    paper_rate: float = Field(0.08, gt=0.0, le=1.0, description="Paper: learning rate")
+    paper_batch: int = Field(
+        5, ge=2, description="Paper: ABRDFs of a batch, each with all its directions (our reading)"
+    )
+    targets: Literal["texels", "representatives"] = Field(
+        "texels", description="Paper: fit every texel, or its cluster's representative (unsaid)"
+    )
+    widths: list[int] = Field(
+        [],
+        max_length=9,
+        description="Channels of the encoder's blocks (unsaid); empty: 8, 16, 16, …",
+    )
+    network_seed: int = Field(0, ge=0, description="Seed of the network and its batches")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"steps": 120, "batch_images": 64, "encoder_steps": 10, "paper_steps": 30},
+        "paper": {"steps": 16_000, "encoder_steps": 300, "paper_steps": 200_000},
+    }
+
+
 def _check_material(source: Source, settings: Mapping[str, Any]) -> None:
     if source.path is not None:
         open_btf(source.path, settings.get("crop"))
@@ -47,22 +88,28 @@ def _check_material(source: Source, settings: Mapping[str, Any]) -> None:
         raise ValueError(f"crop is set for {source.name}; expected a BTF of yours.")
 
 
-def _check_clusters(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """Refuse more clusters than texels before anything is made."""
-    if "clusters" not in sources or sources["clusters"].key == NONE:
+def _check_sizes(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    """Refuse more clusters than texels, and too deep an encoder, before anything is made."""
+    if "clusters" not in sources:
         return
-    taken_in = settings["btf_images"]
+    taken_in, network = settings["btf_images"], settings["neural_btf"]
     assert isinstance(taken_in, ImageSettings)
-    path = sources["material"].path
-    if path is None:
-        texels = taken_in.texels**2
+    assert isinstance(network, NetworkSettings)
+    material, clusters = sources["material"], sources["clusters"].key
+    if material.path is None:
+        texels, images = taken_in.texels**2, taken_in.directions**2
     else:
-        measured = open_btf(path, taken_in.crop)
-        texels = measured.height * measured.width
-    if int(sources["clusters"].key) > texels:
+        measured = open_btf(material.path, taken_in.crop)
+        texels, images = measured.height * measured.width, measured.images
+    if clusters != NONE and int(clusters) > texels:
         raise ValueError(
-            f"{sources['material'].name}: clusters is {sources['clusters'].key}; "
-            f"expected at most {texels}, the number of texels."
+            f"{material.name}: clusters is {clusters}; expected at most {texels}, the number of "
+            "texels."
+        )
+    if 3 ** len(network.widths) > images or any(width < 1 for width in network.widths):
+        raise ValueError(
+            f"{material.name}: widths is {network.widths}; expected positive numbers, at most "
+            f"{int(math.log(images, 3))}, as every block leaves a third of {images} photographs."
         )
 
 
@@ -105,6 +152,6 @@ BTF = System(
             check=lambda source, settings: None,
         ),
     ),
-    check=_check_clusters,
+    check=_check_sizes,
     overview=_wall,
 )

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
-
-from pydantic import Field
+from typing import TYPE_CHECKING, Any
 
 from assets_defs.checks import Check, Checked
 from assets_defs.neural_btf.datasets import (
@@ -14,8 +12,8 @@ from assets_defs.neural_btf.datasets import (
     payload_bytes,
     reader,
 )
-from assets_defs.neural_btf.declaration import BTF
-from assets_defs.settings import Preset, Settings
+from assets_defs.neural_btf.declaration import BTF, NetworkSettings
+from assets_defs.settings import Settings
 from assets_defs.system import Metadata
 from storage.schemas import neural_btf as schemas
 from storage.work_state import WorkState
@@ -34,44 +32,6 @@ _POOL_BYTES = 6 << 30
 
 
 # ---- neural_btf ------------------------------------------------------------------------------
-
-
-class NetworkSettings(Settings):
-    """How the network is trained."""
-
-    training: Literal["fast", "paper"] = Field(
-        "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
-    )
-    steps: int = Field(600, ge=1, description="Fast: steps of gradient descent")
-    rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
-    batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
-    batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
-    warm_start: Literal["pca", "encoder", "random"] = Field(
-        "pca", description="Fast: where the latents start"
-    )
-    encoder_share: float = Field(
-        0.25, ge=0.0, le=1.0, description="Warm start encoder: share of the steps through it"
-    )
-    encoder_steps: int = Field(
-        60, ge=0, description="Fast: steps of fitting the encoder to the latents at the end"
-    )
-    paper_steps: int = Field(2000, ge=1, description="Paper: steps of gradient descent")
-    paper_rate: float = Field(0.08, gt=0.0, le=1.0, description="Paper: learning rate")
-    paper_batch: int = Field(
-        5, ge=2, description="Paper: ABRDFs of a batch, each with all its directions (our reading)"
-    )
-    targets: Literal["texels", "representatives"] = Field(
-        "texels", description="Paper: fit every texel, or its cluster's representative (unsaid)"
-    )
-    widths: list[int] = Field(
-        [], description="Channels of the encoder's blocks (unsaid); empty: 8, 16, 16, …"
-    )
-    network_seed: int = Field(0, ge=0, description="Seed of the network and its batches")
-
-    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"steps": 120, "batch_images": 64, "encoder_steps": 10, "paper_steps": 30},
-        "paper": {"steps": 16_000, "encoder_steps": 300, "paper_steps": 200_000},
-    }
 
 
 def _curve_pictures(dataset: xr.Dataset) -> Pictures:

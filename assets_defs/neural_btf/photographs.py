@@ -97,6 +97,8 @@ def btf_images(
         height, width = measured.height, measured.width
         read = _told(measured.read, measured.images, progress)
         about = {"layout": measured.layout, "colour": measured.colour}
+        if measured.shifted_lights:
+            about["shifted lights"] = f"{measured.shifted_lights} photographs, nominal angles kept"
         lights = measured.lights_per_view
     dataset = xr.Dataset(
         {
