@@ -52,6 +52,12 @@ def plain() -> int:
 def figure(height: float) -> float:
     return height
 ''',
+    "assets_defs/street/points.py": (
+        "from assets_defs.pictures import table\nfrom assets_defs.street.datasets import cloud\n\n\n"
+        "def points() -> int:\n    return cloud() + table()\n"
+    ),
+    "assets_defs/street/datasets.py": "def cloud() -> int:\n    return 6\n",
+    "assets_defs/pictures.py": "def table() -> int:\n    return 9\n",
     "pipelines/medium.py": '''"""The medium."""
 
 from dataclasses import dataclass
@@ -103,7 +109,10 @@ Version = Callable[..., str]
 @pytest.fixture
 def version(tmp_path: Path) -> Version:
     """Code version of the small project's `stack` with replacements (file, old, new) made."""
-    for package in ("assets_defs", "pipelines", "pipelines/deep", "storage", "storage/readers"):
+    for package in (
+        *("assets_defs", "assets_defs/street", "pipelines", "pipelines/deep"),
+        *("storage", "storage/readers"),
+    ):
         (tmp_path / package).mkdir()
         (tmp_path / package / "__init__.py").touch()
     source = Path(module.__file__).read_text()
@@ -172,6 +181,15 @@ def test_what_computes_nothing_else_changes_no_version(version: Version) -> None
 def test_every_change_of_what_is_computed_is_another_version(version: Version) -> None:
     versions = {"nothing": version()} | {name: version(change) for name, change in OTHER.items()}
     assert len(set(versions.values())) == len(versions), versions
+
+
+def test_functions_of_the_systems_own_package_count_and_others_do_not(version: Version) -> None:
+    script = "from assets_defs.street.points import points\nprint(code_version(points))"
+    before = version(script=script)
+    near = ("assets_defs/street/datasets.py", "6", "7")
+    far = ("assets_defs/pictures.py", "9", "10")
+    assert version(near, script=script) != before
+    assert version(far, script=script) == before
 
 
 def test_a_version_does_not_depend_on_what_was_asked_before(version: Version) -> None:
