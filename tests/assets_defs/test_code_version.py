@@ -53,7 +53,8 @@ def figure(height: float) -> float:
     return height
 ''',
     "assets_defs/street/points.py": (
-        "from assets_defs.pictures import table\nfrom assets_defs.street.datasets import cloud\n\n\n"
+        "from assets_defs.pictures import table\n"
+        "from assets_defs.street.datasets import cloud\n\n\n"
         "def points() -> int:\n    return cloud() + table()\n"
     ),
     "assets_defs/street/datasets.py": "def cloud() -> int:\n    return 6\n",
