@@ -120,7 +120,7 @@ class Launcher:
                 system.check(
                     {name: system.source(name, key, inbox) for name, key in asked.items()},
                     {
-                        plan.name: self._settings(request, plan, asked)
+                        plan.name: self._settings(request, plan, {d: asked[d] for d in plan.by})
                         for plan in system.plans.values()
                         if set(plan.by) <= set(asked)
                     },

@@ -371,6 +371,7 @@ class System:
             }
             named = inspect.signature(function).parameters
             dataset, metadata = function(**{name: offered[name] for name in named})
+            shown = plan.pictures(dataset) if plan.pictures else {}
         except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
             # Left to itself, Dagster would take the interruption for trouble and try again.
             raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
@@ -381,7 +382,6 @@ class System:
             "run": context.run.run_id,
             "checks": [check.name for check in plan.checks],
         }
-        shown = plan.pictures(dataset) if plan.pictures else {}
         thumbnails = {name: thumbnail(picture) for name, picture in shown.items()}
         return dg.Output(
             dataset.assign_attrs({RECORD: record}), metadata={**thumbnails, **metadata}

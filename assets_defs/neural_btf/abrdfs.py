@@ -118,7 +118,7 @@ def abrdf_matrix(
         lambda: (abrdf.columns(block, settings.space) for block in image_blocks(images)), rank
     )
     progress(0.9)
-    matrix = images.data.transpose(1, 2, 0, 3).reshape(height * width, count, 3)
+    matrix = abrdf.texel_rows(images.data)
     texels = max(1, (8 << 20) // (count * 3 * 2))
     dataset = xr.Dataset(
         {

@@ -6,7 +6,7 @@ deviation sigma over the texels, for every photograph and channel by itself.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,8 +85,15 @@ def columns(images: NDArray[np.floating], space: Space) -> NDArray[np.float32]:
     return transposed(values).reshape(images.shape[1] * images.shape[2], -1)
 
 
-def transposed(images: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Photographs (image, y, x, channel) as ABRDFs (texel, image, channel), texels row by row."""
+def texel_rows(images: Any) -> Any:
+    """Photographs (image, y, x, channel) as (texel, image, channel), texels row by row.
+
+    Of a NumPy array or of a lazy one, whose transposition is lazy then.
+    """
     count, height, width, channels = images.shape
-    turned = images.reshape(count, height * width, channels).transpose(1, 0, 2)
-    return np.ascontiguousarray(turned)
+    return images.transpose(1, 2, 0, 3).reshape(height * width, count, channels)
+
+
+def transposed(images: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The same, contiguous in memory."""
+    return np.ascontiguousarray(texel_rows(images))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -18,10 +19,12 @@ from PIL import Image
 from assets_defs.definitions import SYSTEMS
 from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
+from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
-from assets_defs.system import Source, partition_key
+from assets_defs.system import Source, System, partition_key
 from storage.schemas import schemas_of
 from storage.versions import Slot
+from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
 
 
 def test_dagster_validates_the_workspace(tmp_path: Path) -> None:
@@ -42,24 +45,36 @@ def test_dagster_validates_the_workspace(tmp_path: Path) -> None:
 
 def test_importing_the_definitions_imports_nothing_heavy() -> None:
     heavy = ("xarray", "zarr", "dask", "pyvista", "vtkmodules", "open3d", "scipy", "skimage")
+    heavy += ("torch", "sklearn", "numba", "cv2", "matplotlib")
     code = f"import sys, assets_defs.entry; print([m for m in {heavy} if m in sys.modules])"
     checkout = Path(__file__).parents[2]
     printed = subprocess.check_output([sys.executable, "-c", code], cwd=checkout, text=True)
     assert printed.strip() == "[]"
 
 
+def _parents(house: Any, system: System) -> dict[str, set[str]]:
+    graph = house.definitions.get_repository_def().asset_graph
+    nodes = {name: graph.get(dg.AssetKey([system.name, name])) for name in system.plans}
+    return {name: {key.path[-1] for key in node.parent_keys} for name, node in nodes.items()}
+
+
 def test_the_graph_has_the_papers_shape(house: Any) -> None:
     graph = house.definitions.get_repository_def().asset_graph
-    key = {name: dg.AssetKey(["photo_fur", name]) for name in FUR.plans}
-    parents = {
-        name: {parent.path[-1] for parent in graph.get(key[name]).parent_keys} for name in key
-    }
-    assert parents == {
+    assert _parents(house, FUR) == {
         "fur_photo": set(),
         "attenuation": {"fur_photo"},
         "shell_stack": {"fur_photo", "attenuation"},
         "shell_mesh": set(),
         "fur_frames": {"fur_photo", "attenuation", "shell_mesh"},
+    }
+    assert _parents(house, BTF) == {
+        "btf_images": set(),
+        "abrdf_matrix": {"btf_images"},
+        "abrdf_clusters": {"btf_images", "abrdf_matrix"},
+        "neural_btf": {"abrdf_matrix", "abrdf_clusters"},
+        "compressed_btf": {"abrdf_matrix", "abrdf_clusters", "neural_btf"},
+        "restored_images": {"btf_images", "abrdf_matrix", "compressed_btf"},
+        "cloth_frames": {"compressed_btf"},
     }
     for system in SYSTEMS.values():
         assert [plan.schema for plan in system.plans.values()] == list(schemas_of(system.name))
@@ -247,6 +262,40 @@ def test_a_dropped_file_that_is_no_photograph_fails_with_its_sentence(make_house
     failure = next(event for event in done.all_events if event.is_step_failure)
     assert "broken.png" in str(failure.step_failure_data.error)
     assert list(house.workspace.store.slots()) == []
+
+
+@pytest.mark.parametrize("kind", ["zip", "folder"])
+def test_a_dropped_btf_is_registered_and_requested(
+    make_house: Any, tmp_path: Path, kind: str
+) -> None:
+    house = make_house()
+    inbox = house.workspace.inbox("neural_btf")
+    inbox.mkdir(parents=True)
+    noise = np.random.default_rng(3).integers(0, 256, (225, 4, 4, 3), dtype=np.uint8)
+    write_ubo2003_zip(tmp_path / "wolle.zip", noise, FIFTEEN, FIFTEEN)
+    if kind == "zip":
+        shutil.copyfile(tmp_path / "wolle.zip", inbox / "wolle.zip")
+    else:
+        shutil.unpack_archive(tmp_path / "wolle.zip", inbox / "wolle")
+    inside = list(inbox.rglob("*"))
+    for path in inside:
+        _settle(path)
+    tick = _tick(house, None)
+    (request,) = tick.run_requests
+    materials = set(house.instance.get_dynamic_partitions("neural_btf_material"))
+    assert materials - set(BTF.dimension("material").builtin) == {f"wolle-{kind}"}
+    clusters = house.instance.get_dynamic_partitions("neural_btf_clusters")
+    assert set(clusters) == set(BTF.dimension("clusters").builtin)
+    config = request.run_config["ops"]["launch_graph"]["config"]
+    assert config["system"] == "neural_btf"
+    assert config["partitions"] == [{"material": f"wolle-{kind}", "clusters": "none"}]
+    # The same again: nothing. One file that changes is another BTF, once it has settled.
+    assert _tick(house, tick.cursor).run_requests == []
+    changed = next(path for path in inside if path.is_file())
+    changed.touch()
+    assert _tick(house, tick.cursor).run_requests == []
+    _settle(changed, SETTLED_SECONDS + 0.5)
+    assert len(_tick(house, tick.cursor).run_requests) == 1
 
 
 def test_the_asset_page_is_up_to_date() -> None:

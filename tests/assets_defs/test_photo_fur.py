@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from assets_defs.photo_fur import FUR
 from pipelines import geometry
 from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells, virtual_pelt
 from storage.versions import Slot
+from tests.assets_defs.regressions import Regression, assert_found
 
 KEYS = {"photo": "grass", "mesh": "square"}
 PELT_KEYS = {"photo": "pelt", "mesh": "teapot"}
@@ -70,17 +71,6 @@ def test_one_setting_remakes_only_what_depends_on_it(good: Any) -> None:
 # ---- planted regressions ---------------------------------------------------------------------
 
 
-class Regression(NamedTuple):
-    """A bug put into the numerics, and the check that must find it."""
-
-    check: str
-    home: Any
-    name: str
-    wrong: Callable[..., Any]
-    """Called with the right function and then its arguments."""
-    keys: dict[str, str] = KEYS
-
-
 def _dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     return np.full_like(right(*arguments, **options), attenuation.DROPPED)
 
@@ -117,35 +107,46 @@ def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -
 
 
 REGRESSIONS = (
-    Regression("contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5),
     Regression(
-        "clipped_share", photograph, "expose", lambda right, photo: np.clip(right(photo) * 6, 0, 1)
+        "contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5, KEYS
+    ),
+    Regression(
+        "clipped_share",
+        photograph,
+        "expose",
+        lambda right, photo: np.clip(right(photo) * 6, 0, 1),
+        KEYS,
     ),
     Regression(
         "kept_share",
         attenuation,
         "fit_attenuation",
         lambda right, grey, tail: right(grey, tail=0.2),
+        KEYS,
     ),
     Regression(
         "decay_error",
         attenuation.Attenuation,
         "boundaries",
         lambda right, self, layers: np.linspace(self.brightest, self.darkest, layers + 1),
+        KEYS,
     ),
     Regression("depth_rank_correlation", virtual_pelt, "virtual_pelt", _shuffled_pelt, PELT_KEYS),
-    Regression("partition_error", attenuation, "layer_masks", _doubled_masks),
-    Regression("interval_error", attenuation, "layer_of", _linear_layers),
+    Regression("partition_error", attenuation, "layer_masks", _doubled_masks, KEYS),
+    Regression("interval_error", attenuation, "layer_of", _linear_layers, KEYS),
     Regression(
         "step_error",
         shells,
         "shell_heights",
         lambda right, thickness, layers: right(thickness, layers) ** 2 / thickness,
+        KEYS,
     ),
     Regression("texture_stretch", geometry, "teapot", _stretched_teapot, PELT_KEYS),
-    Regression("top_view_rmse", drawing, "depth_code", _half_dropped),
-    Regression("least_coverage", drawing, "depth_code", _dropped),
-    Regression("mean_brightness", frames, "to_8bit", lambda right, picture: right(picture * 0.8)),
+    Regression("top_view_rmse", drawing, "depth_code", _half_dropped, KEYS),
+    Regression("least_coverage", drawing, "depth_code", _dropped, KEYS),
+    Regression(
+        "mean_brightness", frames, "to_8bit", lambda right, picture: right(picture * 0.8), KEYS
+    ),
 )
 
 
@@ -158,36 +159,7 @@ def test_every_check_has_a_planted_regression() -> None:
 def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
     good: Any, regression: Regression, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store = good.workspace.store
-    before = {slot: store.pointer(slot) for slot in store.slots()}
-    content = {slot: store.record(slot)["content"] for slot in before}
-    versions = {slot: set(store.versions(slot)) for slot in before}
-    right = getattr(regression.home, regression.name)
-    monkeypatch.setattr(
-        regression.home,
-        regression.name,
-        lambda *arguments, **options: regression.wrong(right, *arguments, **options),
-    )
-    with pytest.raises(LaunchError):
-        good.launcher.launch(Request(FUR, [regression.keys], force=True))
-    failed = {
-        check
-        for slot in before
-        for version in set(store.versions(slot)) - versions[slot]
-        for check, verdict in store.verdicts(slot, version).items()
-        if not verdict["passed"]
-    }
-    assert regression.check in failed
-    checked = {plan.name for plan in FUR.plans.values() for c in plan.checks if c.name in failed}
-    for slot, pointer in before.items():
-        store.open(slot).load()
-        if slot.asset in checked:
-            assert store.pointer(slot).version == pointer.version
-            assert store.record(slot)["content"] == content[slot]
-    monkeypatch.undo()
-    # What lies before the failed asset passed its own checks, wrong as it was: make it again.
-    force = any(store.current(slot) != pointer.version for slot, pointer in before.items())
-    good.launcher.launch(Request(FUR, [regression.keys], force=force))
+    assert_found(good, FUR, regression, monkeypatch)
 
 
 def test_a_step_inside_the_bound_is_a_regression_too(

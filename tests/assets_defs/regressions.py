@@ -1,0 +1,58 @@
+"""Bugs put into the numerics: each must be found by its check and change nothing current."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+from assets_defs.launcher import LaunchError, Request
+from assets_defs.system import System
+
+
+class Regression(NamedTuple):
+    """A bug, and the check that must find it."""
+
+    check: str
+    home: Any
+    name: str
+    wrong: Callable[..., Any]
+    """Called with the right function and then its arguments."""
+    keys: dict[str, str]
+
+
+def assert_found(
+    house: Any, system: System, regression: Regression, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plant the bug, launch, see that its check fails and the last good versions stay; clean up."""
+    store = house.workspace.store
+    before = {slot: store.pointer(slot) for slot in store.slots()}
+    content = {slot: store.record(slot)["content"] for slot in before}
+    versions = {slot: set(store.versions(slot)) for slot in before}
+    right = getattr(regression.home, regression.name)
+    monkeypatch.setattr(
+        regression.home,
+        regression.name,
+        lambda *arguments, **options: regression.wrong(right, *arguments, **options),
+    )
+    with pytest.raises(LaunchError):
+        house.launcher.launch(Request(system, [regression.keys], force=True))
+    failed = {
+        check
+        for slot in before
+        for version in set(store.versions(slot)) - versions[slot]
+        for check, verdict in store.verdicts(slot, version).items()
+        if not verdict["passed"]
+    }
+    assert regression.check in failed
+    checked = {plan.name for plan in system.plans.values() for c in plan.checks if c.name in failed}
+    for slot, pointer in before.items():
+        store.open(slot).load()
+        if slot.asset in checked:
+            assert store.pointer(slot).version == pointer.version
+            assert store.record(slot)["content"] == content[slot]
+    monkeypatch.undo()
+    # What lies before the failed asset passed its own checks, wrong as it was: make it again.
+    force = any(store.current(slot) != pointer.version for slot, pointer in before.items())
+    house.launcher.launch(Request(system, [regression.keys], force=force))
