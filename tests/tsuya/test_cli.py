@@ -161,6 +161,31 @@ def test_bad_files_are_refused_and_leave_nothing(
     assert _files(home / "data") == before
 
 
+def test_a_btf_runs_in_two_columns(home: Path) -> None:
+    result = tsuya(
+        *("run", "neural_btf", "--material", "silk", "--clusters", "none", "--clusters", "20"),
+        *("--preset", "test", "--json"),
+    )
+    assert result.exit_code == 0, result.output
+    assets = {a["key"]: a for a in json.loads(result.stdout.splitlines()[-1])["assets"]}
+    by_column = ("abrdf_clusters", "neural_btf", "compressed_btf", "restored_images")
+    assert set(assets) == {f"neural_btf/{name}/silk" for name in ("btf_images", "abrdf_matrix")} | {
+        f"neural_btf/{name}/{clusters}.silk"
+        for name in (*by_column, "cloth_frames")
+        for clusters in ("none", "20")
+    }
+    assert assets["neural_btf/restored_images/20.silk"]["figures"]["rmse_over_none"] <= 1.5
+    assert "rmse_over_none" not in assets["neural_btf/restored_images/none.silk"]["figures"]
+    made = _files(home / "data" / "store" / "neural_btf")
+    for clusters in ("007", "0", "-3", "many"):
+        result = tsuya("run", "neural_btf", "--material", "silk", f"--clusters={clusters}")
+        assert result.exit_code == 2
+        assert clusters in result.stderr
+        assert "clusters" in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1
+    assert _files(home / "data" / "store" / "neural_btf") == made
+
+
 def test_status_path_and_rollback(made: dict[str, Any], home: Path) -> None:
     assert "photo_fur/attenuation/grass" in tsuya("status").stdout
     before = json.loads(tsuya("status", "--json").stdout)["assets"]
