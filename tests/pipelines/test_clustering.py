@@ -88,7 +88,7 @@ def test_seeds_are_drawn_by_the_squared_distance() -> None:
     squares = (place[:, None] - place) ** 2
     chance = squares / squares.sum(axis=1, keepdims=True) / 3  # first seed evenly, then D(x)²
     apart = chance[0, 1] + chance[1, 0]
-    runs = 1000
+    runs = 1500
     counts = np.zeros(2)
     for seed in range(runs):
         labels = k_means_plus_plus(place[:, None], 2, seed)

@@ -198,15 +198,20 @@ def one_texel(texel: int = 9) -> TrainingData:
     )  # fmt: skip
 
 
-def test_a_step_of_the_paper_is_plain_gradient_descent() -> None:
+@pytest.mark.parametrize("seen", [None, 30], ids=["own", "another's"])
+def test_a_step_of_the_paper_is_plain_gradient_descent(seen: int | None) -> None:
+    """The encoder sees the representative, the decoder is to give the texel's own values."""
     data = one_texel()
+    if seen is not None:
+        data = dataclasses.replace(data, representatives=transposed(IMAGES)[seen : seen + 1])
     trainer = Trainer(data, PAPER)
     encoder = encoder_of(encoder_vector(trainer.encoder), len(PAIRS.light), WIDTHS).train()
     decoder = Decoder()
     decoder.load_state_dict(trainer.decoder.state_dict())
 
     values = np.repeat(data.pool.part(0)[1], 5, axis=0)
-    x3 = torch.from_numpy(standardised(values, data.mean, data.deviation))
+    shown = values if data.representatives is None else data.representatives.repeat(5, axis=0)
+    x3 = torch.from_numpy(standardised(shown, data.mean, data.deviation))
     latents = encoder(x3).repeat_interleave(len(PAIRS.light), dim=0)
     colours = decoder(latents, torch.from_numpy(data.directions).repeat(5, 1))
     wanted = torch.from_numpy(values.astype(np.float32) / data.alpha).reshape(-1, 3)
@@ -272,6 +277,16 @@ def test_a_run_that_is_stopped_and_resumed_gives_the_same_bits(
             first.step()
         torch.rand(7)  # another run's draws
         assert_equal_bits(train(data, plan, resume=first.state()), whole)
+
+
+def test_a_curve_goes_on_in_the_middle_of_a_point(
+    data: TrainingData, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(training, "_CURVE_POINTS", 3)
+    first = Trainer(data, FAST)
+    for _ in range(14):
+        first.step()
+    assert_equal_bits(train(data, FAST, resume=first.state()), train(data, FAST))
 
 
 def test_a_matrix_in_parts_is_resumed_with_the_same_bits(
