@@ -3,6 +3,8 @@ SHELL := /bin/sh
 VENV := .venv/bin
 SETUP := .venv/set-up
 NAME ?= fur
+# Tests run side by side; kernels of several threads would wait for each other.
+ONE_THREAD := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .PHONY: help setup demo test test-slow ui bench lint docs doctor
 
@@ -21,7 +23,7 @@ demo: setup      ## every system's examples, their pictures under pictures/
 	@$(VENV)/tsuya demo
 
 test: setup      ## all tests but the paper-size ones
-	@$(VENV)/python -m pytest -q
+	@$(ONE_THREAD) $(VENV)/python -m pytest -q
 
 test-slow: setup ## the paper-size tests
 	@$(VENV)/python -m pytest -q -n 0 -m slow
@@ -29,7 +31,7 @@ test-slow: setup ## the paper-size tests
 ui: setup        ## the Dagster web UI on http://127.0.0.1:3000
 	@set -a && . ./.env && $(VENV)/dagster dev -w workspace.yaml -h 127.0.0.1 -p 3000
 
-bench: setup     ## a benchmark: make bench NAME=fur
+bench: setup     ## a benchmark: make bench NAME=btf
 	@$(VENV)/python -m benchmarks $(NAME)
 
 lint: setup      ## ruff and mypy

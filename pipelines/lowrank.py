@@ -31,9 +31,10 @@ def principal_components(
     """The ``rank`` largest principal components of the rows, in ``iterations + 2`` passes.
 
     Randomised subspace iteration (Halko, Martinsson, Tropp 2011, algorithm 4.4) over blocks of
-    columns: memory is one block and a few (rows, rank) arrays. Singular values whose squares
-    decay slowly are found to a fraction of a per cent with two iterations. A matrix of lower rank
-    gives components of length 0. Signs are fixed: the largest entry of every loading is positive.
+    columns: memory is one block and a few (rows, rank) arrays. Two iterations find singular values
+    that decay to a fraction of a per cent, those of noise (no decay) to some two per cent. A matrix
+    of lower rank gives components of length 0. Signs are fixed: the largest entry of every loading
+    is positive.
 
     Raises ValueError where ``rank`` is not between 1 and the number of rows or columns.
     """

@@ -211,8 +211,8 @@ def _key(
 ) -> str:
     """The key of a built-in or registered item; a file is taken into the inbox."""
     known = system.sources(dimension.name, session.workspace.inbox(system.name))
-    if item in known or dimension.needs_no_file(item):
-        return item
+    if item in known or not (dimension.suffixes or dimension.folders):
+        return system.source(dimension.name, item, session.workspace.inbox(system.name)).key
     if not Path(item).exists():
         raise ValueError(
             f"{item}: no such {dimension.name}; expected a file or one of {', '.join(known)}."

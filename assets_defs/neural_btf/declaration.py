@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -108,8 +107,8 @@ def _check_sizes(sources: Mapping[str, Source], settings: Mapping[str, Settings]
         )
     if 3 ** len(network.widths) > images or any(width < 1 for width in network.widths):
         raise ValueError(
-            f"{material.name}: widths is {network.widths}; expected positive numbers, at most "
-            f"{int(math.log(images, 3))}, as every block leaves a third of {images} photographs."
+            f"{material.name}: widths is {network.widths}; expected fewer positive numbers, as "
+            f"every block leaves a third of {images} photographs."
         )
 
 

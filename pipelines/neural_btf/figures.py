@@ -36,7 +36,8 @@ def spread_ratio(scores: NDArray[np.floating], ids: NDArray[np.integer]) -> floa
     counts = np.bincount(ids)
     sums = np.stack([np.bincount(ids, column) for column in points.T], axis=1)
     inside = np.sum((points - (sums / np.maximum(counts, 1)[:, None])[ids]) ** 2)
-    return float(inside / np.sum((points - points.mean(axis=0)) ** 2))
+    whole = np.sum((points - points.mean(axis=0)) ** 2)
+    return float(inside / whole) if whole > 0 else 0.0
 
 
 def transposition_error(abrdfs: NDArray[np.floating], images: NDArray[np.floating]) -> float:

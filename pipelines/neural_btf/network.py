@@ -30,6 +30,14 @@ def encoder_blocks(images: int) -> int:
     return max(1, math.ceil(math.log(images / _MOST_AFTER_POOLING, 3)))
 
 
+def most_blocks(images: int) -> int:
+    """Blocks that leave at least one value of so many photographs."""
+    blocks = 0
+    while images >= 3:
+        images, blocks = images // 3, blocks + 1
+    return blocks
+
+
 class Encoder(nn.Module):
     """ABRDFs (texel, image, channel), standardised, to latents (texel, 8).
 
@@ -52,7 +60,7 @@ class Encoder(nn.Module):
         if length < 1:
             raise ValueError(
                 f"widths has {len(widths)} blocks for {images} photographs; expected at most "
-                f"{int(math.log(images, 3))}, as every block leaves a third."
+                f"{most_blocks(images)}, as every block leaves a third."
             )
         self.blocks = nn.Sequential(*blocks)
         self.latents = nn.Linear(channels * length, LATENTS)
@@ -137,13 +145,14 @@ def encoder_of(vector: NDArray[np.float32], images: int, widths: Sequence[int]) 
     """The encoder of a vector that `encoder_vector` made."""
     encoder = Encoder(images, widths)
     state, start = encoder.state_dict(), 0
+    expected = sum(part.numel() for part in state.values() if part.is_floating_point())
+    if len(vector) != expected:
+        raise ValueError(f"encoder has {len(vector)} numbers; expected {expected}.")
     for name, part in state.items():
         if part.is_floating_point():
             values = vector[start : start + part.numel()].reshape(tuple(part.shape))
             state[name] = torch.from_numpy(values.copy())
             start += part.numel()
-    if start != len(vector):
-        raise ValueError(f"encoder has {len(vector)} numbers; expected {start}.")
     encoder.load_state_dict(state)
     return encoder.eval()
 

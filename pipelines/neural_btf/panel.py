@@ -177,8 +177,9 @@ def _held(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit vectors no lower than what was measured; lower ones are lifted, their azimuth kept."""
     least = math.cos(_MOST_THETA)
     low = vectors[:, 2] < least
-    level = np.hypot(vectors[low, 0], vectors[low, 1])
     lifted = vectors.copy()
+    lifted[low & (vectors[:, 2] == -1.0), 0] = 1.0  # straight from below: any azimuth will do
+    level = np.hypot(lifted[low, 0], lifted[low, 1])
     lifted[low, :2] *= (math.sin(_MOST_THETA) / np.maximum(level, 1e-12))[:, None]
     lifted[low, 2] = least
     return lifted

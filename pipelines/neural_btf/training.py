@@ -188,6 +188,7 @@ class Trainer:
         self.total = sum(steps for _, steps in self.stages)
         self.done = 0
         self._curve: list[tuple[int, float]] = []
+        self._optimisers: list[torch.optim.Optimizer] = []
         self._loss, self._losses = torch.zeros((), device=self._device), 0
         self._stage = 0
         self._step_in_stage = 0
@@ -223,6 +224,7 @@ class Trainer:
         if not self.finished and self.stages[self._stage][0] in ("paper", "encoder"):
             self._encode_all()
         latents = self.latents.detach().cpu().numpy().copy()
+        residual = self._encoder_residual(latents) if self._encoder_is_trained() else None
         steps = np.array([step for step, _ in self._curve], np.int64)
         values = np.array([value for _, value in self._curve], np.float64)
         return Trained(
@@ -231,13 +233,14 @@ class Trainer:
             latents,
             steps,
             values,
-            self._encoder_residual(latents) if self._encoder_is_trained() else None,
+            residual,
         )
 
     # ---- stages ------------------------------------------------------------------------------
 
     def _begin_stage(self) -> None:
         if self.finished:
+            self._optimisers = []
             return
         name = self.stages[self._stage][0]
         self._losses_of: dict[str, Callable[[np.random.Generator], Tensor]] = {
@@ -247,7 +250,6 @@ class Trainer:
             "distil": self._distil_loss,
         }
         encoder, decoder = list(self.encoder.parameters()), list(self.decoder.parameters())
-        self._optimisers: list[torch.optim.Optimizer]
         if name == "paper":
             self._optimisers = [torch.optim.SGD([*encoder, *decoder], lr=self._plan.rate)]
         elif name == "encoder":
@@ -320,7 +322,7 @@ class Trainer:
             found = self.encoder(self._encoder_input(rows, values))
         owners = torch.from_numpy(self._data.owner[rows]).to(self._device)
         wanted = self.latents.detach()
-        deviation = wanted.std(dim=0) + 1e-6
+        deviation = wanted.std(dim=0, correction=0) + 1e-6
         return (((found.float() - wanted[owners]) / deviation) ** 2).mean()
 
     def _error(self, colours: Tensor, values: NDArray[np.floating]) -> Tensor:
@@ -384,7 +386,9 @@ class Trainer:
             self.latents.copy_(torch.from_numpy(self._encoded()))
 
     def _encoder_is_trained(self) -> bool:
-        return any(name != "latents" for name, _ in self.stages)
+        """Whether a step has trained it by now."""
+        begun = self.stages[: self._stage + (self._step_in_stage > 0)]
+        return any(name != "latents" for name, _ in begun)
 
     def _encoder_residual(self, latents: NDArray[np.float32]) -> float:
         steps = (self._encoded() - latents) / (latents.std(axis=0) + 1e-6)

@@ -321,11 +321,6 @@ def test_every_state_that_is_kept_can_be_resumed(
         assert_equal_bits(train(data, plan, resume=state), whole)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="state() of a finished run has the last stage's optimisers",
-    raises=ValueError,
-)
 def test_a_state_that_was_kept_after_the_last_step_can_be_resumed(data: TrainingData) -> None:
     plan = dataclasses.replace(FAST, steps=3, encoder_steps=2)
     trainer = Trainer(data, plan)
@@ -409,14 +404,12 @@ def test_distillation_fits_the_encoder_and_leaves_the_rest(data: TrainingData) -
     assert many.encoder_residual < 0.75 * few.encoder_residual
 
 
-@pytest.mark.xfail(strict=True, reason="_encoded() in result() turns the encoder back to train()")
 def test_the_encoder_that_is_given_is_ready_for_use(data: TrainingData) -> None:
     found = train(data, PAPER)
     assert not found.encoder.training
 
 
 @pytest.mark.filterwarnings("ignore:std")
-@pytest.mark.xfail(strict=True, reason="the deviation of one latent vector is nan in _distil_loss")
 def test_a_single_latent_vector_can_be_distilled() -> None:
     found = train(one_texel(), dataclasses.replace(FAST, encoder_steps=3))
     assert np.isfinite(encoder_vector(found.encoder)).all()
