@@ -130,7 +130,12 @@ class ZipMembers:
             raise self._damaged(name) from None
 
     def _damaged(self, name: str) -> BadInput:
-        return BadInput(self.path / name, "content", "damaged inside the zip", "a complete member")
+        return BadInput(
+            self.path / name,
+            "content",
+            f"damaged inside the zip {self.path.name}",
+            "a complete member",
+        )
 
 
 def zip_members(path: Path) -> ZipMembers:

@@ -14,6 +14,12 @@ from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher
 from assets_defs.workspace import Workspace
 
+NO_LOGS = {
+    "module": "dagster._core.storage.noop_compute_log_manager",
+    "class": "NoOpComputeLogManager",
+}
+"""Capturing the output of a step starts four processes, and nothing here reads it."""
+
 
 @dataclass
 class House:
@@ -36,7 +42,7 @@ def make_house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[]
         home = root / "dagster"
         home.mkdir()
         instance = dg.DagsterInstance.local_temp(
-            str(home), overrides={"telemetry": {"enabled": False}}
+            str(home), overrides={"telemetry": {"enabled": False}, "compute_logs": NO_LOGS}
         )
         opened.append(instance)
         heard: list[tuple[str, float]] = []

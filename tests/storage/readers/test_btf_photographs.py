@@ -434,7 +434,7 @@ def test_a_byte_that_has_changed_inside_a_zip(tmp_path: Path, method: int) -> No
     path.write_bytes(data)
     btf = open_btf(path)
     text = refusal(lambda: btf.read(0, 1), "00000 tl000 pl000 tv000 pv000.jpg")
-    assert "content is damaged inside the zip; expected a complete member" in text
+    assert f"content is damaged inside the zip {path.name}; expected a complete member" in text
 
 
 def complete_pictures() -> dict[str, bytes]:
