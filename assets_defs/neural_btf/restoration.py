@@ -112,7 +112,7 @@ _worst_texel = _worst("rmse_texel")
             "rmse_over_none",
             "RMSE over that of the same material without clusters.",
             _rmse_over_none,
-            at_most=1.5,
+            at_most=3.0,
             change=0.05,
         ),
         Check(
