@@ -240,7 +240,7 @@ def _default_scale() -> dict[str, Any]:
             figures[f"rmse_{name}_small"] = float(store.open(slot)["rmse"])
         figures["clusters_small"] = clusters
         matrix = store.open(BTF.slot("abrdf_matrix", {"material": SMALL_MATERIAL})).load()
-        groups = store.open(BTF.slot("abrdf_clusters", keys[0]))
+        groups = store.open(BTF.slot("abrdf_clusters", keys[0])).load()
         stored = compressed(store.open(BTF.slot("compressed_btf", keys[0])))
     pairs = Pairs(matrix["light"].values, matrix["view"].values)
     abrdfs = matrix["abrdfs"].values
