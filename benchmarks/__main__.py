@@ -35,7 +35,8 @@ def commit() -> str:
         done = subprocess.run(["git", *arguments], cwd=here, capture_output=True, text=True)
         return done.stdout.strip()
 
-    return git("rev-parse", "--short=12", "HEAD") + ("+" if git("status", "--porcelain") else "")
+    changed = git("status", "--porcelain", "--", ":/", ":!/benchmarks/results")
+    return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
 
 
 def main() -> None:
