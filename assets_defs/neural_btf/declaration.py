@@ -48,7 +48,7 @@ class NetworkSettings(Settings):
     )
     steps: int = Field(400, ge=1, description="Fast: steps of gradient descent")
     rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
-    batch_texels: int = Field(56, ge=1, description="Fast: texels of a batch")
+    batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
     batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
     warm_start: Literal["pca", "encoder", "random"] = Field(
         "pca", description="Fast: where the latents start"
