@@ -27,7 +27,7 @@ class ImageSettings(Settings):
     crop: tuple[int, int, int, int] | None = Field(
         None, description="Left, top, width, height in pixels; whole photographs by default"
     )
-    texels: int = Field(56, ge=4, le=1024, description="Virtual cloth: texels a side")
+    texels: int = Field(48, ge=4, le=1024, description="Virtual cloth: texels a side")
     directions: Literal[15, 41, 81, 151] = Field(
         41, description="Virtual cloth: directions of lights, and of views (15, 41, 81 or 151)"
     )
@@ -46,7 +46,7 @@ class NetworkSettings(Settings):
     training: Literal["fast", "paper"] = Field(
         "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
     )
-    steps: int = Field(400, ge=1, description="Fast: steps of gradient descent")
+    steps: int = Field(300, ge=1, description="Fast: steps of gradient descent")
     rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
     batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
     batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
@@ -57,7 +57,7 @@ class NetworkSettings(Settings):
         0.25, ge=0.0, le=1.0, description="Warm start encoder: share of the steps through it"
     )
     encoder_steps: int = Field(
-        40, ge=0, description="Fast: steps of fitting the encoder to the latents at the end"
+        25, ge=0, description="Fast: steps of fitting the encoder to the latents at the end"
     )
     paper_steps: int = Field(2000, ge=1, description="Paper: steps of gradient descent")
     paper_rate: float = Field(0.08, gt=0.0, le=1.0, description="Paper: learning rate")
