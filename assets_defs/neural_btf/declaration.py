@@ -46,7 +46,7 @@ class NetworkSettings(Settings):
     training: Literal["fast", "paper"] = Field(
         "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
     )
-    steps: int = Field(300, ge=1, description="Fast: steps of gradient descent")
+    steps: int = Field(250, ge=1, description="Fast: steps of gradient descent")
     rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
     batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
     batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")

@@ -191,7 +191,7 @@ def restored_images(
 class ClothSettings(Settings):
     """The panel and its pictures."""
 
-    width: int = Field(400, ge=32, le=8192, description="Width of the pictures, pixels")
+    width: int = Field(320, ge=32, le=8192, description="Width of the pictures, pixels")
     frames: int = Field(6, ge=1, le=720, description="Lights around the panel")
     tiles: float = Field(4.0, gt=0.0, le=100.0, description="Tiles over the panel's width")
     supersampling: int = Field(2, ge=1, le=8, description="Samples a pixel along each axis")
