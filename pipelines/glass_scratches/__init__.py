@@ -1,0 +1,1 @@
+"""Scratches on glass (docs/scratches.md): arrays in, arrays out."""
