@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from pipelines.environments import Sampler, density_of, radiance_of, sample_direction
 from pipelines.glass_scratches import sampling
-from pipelines.glass_scratches.layers import filtered_coverage, scratch_at
+from pipelines.glass_scratches.layers import Features, Pyramid, filtered_coverage, scratch_at
 from pipelines.glass_scratches.sampling import Lobe, bin_of
 from pipelines.glass_scratches.tables import Lean, check_index
 from pipelines.raycasting import build_scene, first_hits, occluded
@@ -58,19 +58,14 @@ _SCATTERED_ANGLE = 0.3
 class Surface(NamedTuple):
     """What lies on a glass solid, as the kernels take it.
 
-    ``layers``: the features and their search grid, as ``scratch_at`` takes them; ``count`` layers;
-    ``tile``: scene units a tile; ``coverage``, ``offsets``, ``resolution``: the flat pyramid;
-    ``angles`` (L,) of the layers; ``lobe``; ``lean``: F at theta_o 0, and gamma, for each bin;
-    ``index`` of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
+    ``features`` and their averaged ``coverage``; ``tile``: scene units a tile; ``lobe`` of the
+    walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards pi / 2; ``index``
+    of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
     """
 
-    layers: tuple[NDArray, ...]
-    count: int
+    features: Features
+    coverage: Pyramid
     tile: float
-    coverage: NDArray[np.float32]
-    offsets: NDArray[np.int64]
-    resolution: int
-    angles: NDArray[np.float32]
     lobe: Lobe
     head_on: NDArray[np.float64]
     gamma: NDArray[np.float64]
@@ -108,9 +103,8 @@ class _Paths(NamedTuple):
 
 
 def make_surface(
-    layers: tuple[NDArray, ...],
-    angles: NDArray[np.float32],
-    pyramid: tuple[NDArray[np.float32], NDArray[np.int64], int],
+    features: Features,
+    coverage: Pyramid,
     lobe: Lobe,
     lean: Lean,
     *,
@@ -121,16 +115,11 @@ def make_surface(
     check_index(index)
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
-    coverage, offsets, resolution = pyramid
     head_on, gamma = lean.factor[0], lean.gamma
     return Surface(
-        layers,
-        len(angles),
-        tile,
+        features,
         coverage,
-        offsets,
-        resolution,
-        angles,
+        tile,
         lobe,
         head_on,
         gamma,
@@ -396,21 +385,19 @@ def _scratch(surface, axis, facing, x, y, width, u, v):  # type: ignore[no-untyp
     """The scratch at a point of the tile: (whether, place across, its direction in the tile)."""
     chosen, covering = -1, 0
     place, angle = 0.0, 0.0
-    level = np.floor(np.log2(max(width * surface.resolution, 1e-9)) + v)
+    level = np.floor(np.log2(max(width * surface.coverage.resolution, 1e-9)) + v)
     state = _mixed(np.uint64(u * 4503599627370496.0) + np.uint64(77))
-    for layer in range(surface.count):
+    for layer in range(len(surface.features.angle)):
         # Each side of each axis has its own part of the tile.
         sx = x + 0.37 * axis + 0.11 * facing
         sy = y + 0.61 * axis + 0.23 * facing
         state = _mixed(state + np.uint64(0x9E3779B97F4A7C15))
         if level < 0:
-            opacity, across, direction = scratch_at(surface.layers, layer, sx, sy)
+            opacity, across, direction = scratch_at(surface.features, layer, sx, sy)
         else:
-            opacity = filtered_coverage(
-                surface.coverage, surface.offsets, surface.resolution, layer, int(level), sx, sy
-            )
+            opacity = filtered_coverage(surface.coverage, layer, int(level), sx, sy)
             across = 2.0 * _unit(_mixed(state + np.uint64(3))) - 1.0
-            direction = surface.angles[layer]
+            direction = np.float64(surface.features.angle[layer])
         if _unit(state) < opacity:
             covering += 1
             # One of those at random: the n-th replaces the last choice with chance 1 / n.
