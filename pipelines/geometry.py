@@ -34,6 +34,9 @@ from pipelines.teapot_patches import (
 _NEWELL_CENTRE = np.array([0.21703756, 0.0, 1.575])
 _NEWELL_RADIUS = 3.34029113
 
+TEAPOT_CENTRE = _NEWELL_CENTRE / _NEWELL_RADIUS
+"""(3,): the middle of the teapot's box, in the coordinates of its grids (see `swept`)."""
+
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -64,7 +67,7 @@ def make_mesh(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike | None =
     """
     points = np.array(vertices, np.float64)
     faces = np.array(triangles)
-    _check_arrays(points, faces)
+    check_arrays(points, faces)
     if uvs is None:
         points, faces, coordinates = unwrap(points, faces)
     else:
@@ -89,7 +92,7 @@ def vertex_normals(
     """
     _, position = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # + 0.0: no -0.0
     position = position.reshape(-1)
-    weighted = _angle_weighted_normals(vertices, triangles)
+    weighted = angle_weighted_normals(vertices, triangles)
     own = np.zeros_like(vertices)
     np.add.at(own, triangles, weighted)
     shared = np.zeros_like(vertices)
@@ -152,7 +155,9 @@ def _not_mirrored(uvs: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDA
     return turned
 
 
-def _check_arrays(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> None:
+def check_arrays(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> None:
+    """Raise ValueError unless vertices (V, 3) are finite and triangles (F, 3), at least one, are
+    integers that refer to them."""
     if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
         raise ValueError(f"vertices have the shape {vertices.shape}; expected (V, 3), finite")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
@@ -166,7 +171,7 @@ def _check_arrays(vertices: NDArray[np.float64], triangles: NDArray[np.integer])
         )
 
 
-def _angle_weighted_normals(
+def angle_weighted_normals(
     vertices: NDArray[np.float64], triangles: NDArray[np.integer]
 ) -> NDArray[np.float64]:
     """(F, 3, 3): each triangle's unit normal times its angle at each corner; 0 without area."""
@@ -241,16 +246,16 @@ def teapot(segments: int = 8) -> Mesh:
     Raises ValueError for less than two segments.
     """
     _check_segments(segments, 2)
-    side = _upright_cylinder(_swept((RIM, UPPER_BODY, LOWER_BODY), segments))
-    bottom = _lower_disc(_swept((BOTTOM,), segments))
-    knob = _upper_disc(_swept((KNOB,), segments))
-    lid = _upper_disc(_swept((LID,), segments))
-    handle = _tube(_closed_ring(HANDLE, segments, first_column=0))
-    spout = _tube(_closed_ring(SPOUT, segments, first_column=segments))
+    side = _upright_cylinder(swept((RIM, UPPER_BODY, LOWER_BODY), segments))
+    bottom = _lower_disc(swept((BOTTOM,), segments))
+    knob = _upper_disc(swept((KNOB,), segments))
+    lid = _upper_disc(swept((LID,), segments))
+    handle = _tube(closed_ring(HANDLE, segments, first_column=0))
+    spout = _tube(closed_ring(SPOUT, segments, first_column=segments))
     # Apart, as the handle's end touches the body in one of its vertices: each keeps its normal.
     surfaces = [_mesh_of_charts(c) for c in ([side, bottom], [knob, lid], [handle], [spout])]
     pot = _side_by_side(surfaces)
-    vertices = pot.vertices - _NEWELL_CENTRE / _NEWELL_RADIUS
+    vertices = pot.vertices - TEAPOT_CENTRE
     return Mesh(vertices, pot.triangles, pot.uvs, pot.normals)
 
 
@@ -285,8 +290,11 @@ def _rows_joined(patches: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.concatenate([patches[0], *(patch[1:] for patch in patches[1:])])
 
 
-def _swept(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
-    """Swept patches of the teapot, one below the other, all around, clockwise from -x."""
+def swept(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
+    """Swept patches of the teapot, one below the other, all around, clockwise from -x.
+
+    As a grid; z up, in units of the sphere around the teapot, which stands on z = 0.
+    """
     controls = [swept_quarter(profile) / _NEWELL_RADIUS for profile in profiles]
     quarter = _rows_joined([_bezier(control, segments) for control in controls])
     quarter[..., 2] = quarter[:, :1, 2]  # without rounding errors: a pole is one position
@@ -296,10 +304,14 @@ def _swept(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
     return np.concatenate([sides[0], *(side[:, 1:] for side in sides[1:])], axis=1)
 
 
-def _closed_ring(
+def closed_ring(
     halves: NDArray[np.float64], segments: int, first_column: int
 ) -> NDArray[np.float64]:
-    """A tube of the teapot, from the patches of its one half and their mirror image in y."""
+    """A tube of the teapot, from the patches of its one half and their mirror image in y.
+
+    As a grid in the coordinates of :func:`swept`, of 2 ``segments`` + 1 rows and columns; the
+    halves' column ``first_column`` comes first.
+    """
     half = _rows_joined([_bezier(control / _NEWELL_RADIUS, segments) for control in halves])
     other = half[:, -2:0:-1] * [1, -1, 1]
     ring = np.roll(np.concatenate([half, other], axis=1), -first_column, axis=1)
@@ -374,7 +386,7 @@ def _relaxed(
     from scipy.sparse import coo_array
     from scipy.sparse.linalg import factorized
 
-    start = _grid_triangles(*grid.shape[:2])
+    start = grid_triangles(*grid.shape[:2])
     end = np.roll(start, -1, axis=1)
     points = grid.reshape(-1, 3)
     edge = points[end] - points[start]
@@ -421,7 +433,7 @@ def _running_sum(steps: NDArray[np.float64]) -> NDArray[np.float64]:
 def _to_scale(grid: NDArray[np.float64], uvs: NDArray[np.float64]) -> _Chart:
     """Scaled about 0 so that areas on the surface and in the chart agree, in the geometric mean
     over the surface: a few strongly stretched triangles then do not shrink all others."""
-    faces = _grid_triangles(*grid.shape[:2])
+    faces = grid_triangles(*grid.shape[:2])
     flat = np.pad(uvs, ((0, 0), (0, 0), (0, 1)))
     area, chart_area = (
         np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1)
@@ -432,7 +444,8 @@ def _to_scale(grid: NDArray[np.float64], uvs: NDArray[np.float64]) -> _Chart:
     return _Chart(grid, uvs * np.exp(0.5 * np.average(ratios, weights=area[there])))
 
 
-def _grid_triangles(rows: int, columns: int) -> NDArray[np.int64]:
+def grid_triangles(rows: int, columns: int) -> NDArray[np.int64]:
+    """Triangles (F, 3) of a grid's positions, numbered row by row; two to each of its cells."""
     numbers = np.arange(rows * columns).reshape(rows, columns)
     a, b = numbers[:-1, :-1], numbers[:-1, 1:]
     d, c = numbers[1:, :-1], numbers[1:, 1:]
@@ -448,7 +461,7 @@ def _mesh_of_charts(charts: Sequence[_Chart]) -> Mesh:
         _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         order = np.argsort(first)  # the grid's order, not that of the values
         renumbered = np.argsort(order)[number.reshape(-1)]
-        faces = renumbered[_grid_triangles(*chart.grid.shape[:2])]
+        faces = renumbered[grid_triangles(*chart.grid.shape[:2])]
         distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         vertices.append(rows[first[order], :3])
         uvs.append(rows[first[order], 3:])

@@ -163,16 +163,16 @@ def nearest_feature(
     cells = arrays.cells
     column, row = min(int(x * cells), cells - 1), min(int(y * cells), cells - 1)
     cell = (layer * cells + row) * cells + column
+    shapes = arrays.shapes  # no views of rows: they would be counted references
     best, found, opacity, across, along = 1.0, -1, 0.0, 0.0, 0.0
     for k in range(arrays.cell_start[cell], arrays.cell_start[cell + 1]):
         i = arrays.cell_items[k]
-        shape = arrays.shapes[i]
-        dx, dy = x - shape[X], y - shape[Y]
+        dx, dy = x - shapes[i, X], y - shapes[i, Y]
         dx -= math.floor(dx + 0.5)
         dy -= math.floor(dy + 0.5)
-        px = shape[COSINE] * dx + shape[SINE] * dy
-        py = shape[COSINE] * dy - shape[SINE] * dx
-        curvature, half_length, half_width = shape[CURVATURE], shape[HALF_LENGTH], shape[HALF_WIDTH]
+        px = shapes[i, COSINE] * dx + shapes[i, SINE] * dy
+        py = shapes[i, COSINE] * dy - shapes[i, SINE] * dx
+        curvature, half_length, half_width = shapes[i, CURVATURE], shapes[i, HALF_LENGTH], shapes[i, HALF_WIDTH]
         v = _across_arc(px, py, curvature) / half_width
         if v * v >= best:
             continue
@@ -185,7 +185,8 @@ def nearest_feature(
             continue
         distance = s * s + (v / wide) ** 2
         if distance < best:
-            best, found, opacity, along = distance, i, strength, u
+            shapes = arrays.shapes  # no views of rows: they would be counted references
+    best, found, opacity, along = distance, i, strength, u
             across = v / (wide * math.sqrt(1.0 - s * s))
     return found, opacity, max(-1.0, min(across, 1.0)), along
 
