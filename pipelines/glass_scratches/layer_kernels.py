@@ -185,8 +185,7 @@ def nearest_feature(
             continue
         distance = s * s + (v / wide) ** 2
         if distance < best:
-            shapes = arrays.shapes  # no views of rows: they would be counted references
-    best, found, opacity, along = distance, i, strength, u
+            best, found, opacity, along = distance, i, strength, u
             across = v / (wide * math.sqrt(1.0 - s * s))
     return found, opacity, max(-1.0, min(across, 1.0)), along
 

@@ -21,7 +21,8 @@ chance that there is a scratch.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numba
 import numpy as np
@@ -30,7 +31,8 @@ from numpy.typing import NDArray
 
 from pipelines.environments import Sampler, density_of, radiance_of, sample_direction
 from pipelines.glass_scratches import sampling
-from pipelines.glass_scratches.layers import Features, Pyramid, filtered_coverage, scratch_at
+from pipelines.glass_scratches.layer_kernels import LayerArrays, filtered_coverage, scratch_at
+from pipelines.glass_scratches.layers import flatten_pyramid, pyramid
 from pipelines.glass_scratches.sampling import Lobe, bin_of
 from pipelines.glass_scratches.tables import Lean, check_index
 from pipelines.raycasting import build_scene, first_hits, occluded
@@ -58,13 +60,16 @@ _SCATTERED_ANGLE = 0.3
 class Surface(NamedTuple):
     """What lies on a glass solid, as the kernels take it.
 
-    ``features`` and their averaged ``coverage``; ``tile``: scene units a tile; ``lobe`` of the
+    ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from its
+    ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile; ``lobe`` of the
     walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards pi / 2; ``index``
     of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
     """
 
-    features: Features
-    coverage: Pyramid
+    layers: LayerArrays
+    coverage: NDArray[np.float32]
+    offsets: NDArray[np.int64]
+    resolution: int
     tile: float
     lobe: Lobe
     head_on: NDArray[np.float64]
@@ -103,22 +108,28 @@ class _Paths(NamedTuple):
 
 
 def make_surface(
-    features: Features,
-    coverage: Pyramid,
+    layers: LayerArrays,
+    coverage: NDArray[np.float32],
     lobe: Lobe,
     lean: Lean,
     *,
     tile: float,
     index: float,
 ) -> Surface:
-    """Put layers, table and glass together. Raises ValueError for an index or tile not positive."""
+    """Put layers with their coverage (L, R, R), table and glass together.
+
+    Raises ValueError for an index or tile that is not positive, and an R that is no power of two.
+    """
     check_index(index)
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
+    flat, offsets = flatten_pyramid(pyramid(coverage))
     head_on, gamma = lean.factor[0], lean.gamma
     return Surface(
-        features,
-        coverage,
+        layers,
+        flat,
+        offsets,
+        coverage.shape[1],
         tile,
         lobe,
         head_on,
@@ -273,7 +284,8 @@ def _trace_block(scene, shape, surface, environment, paths, samples, offset, uni
         towards = np.zeros((len(paths.number), 3))
         offered = np.zeros((len(paths.number), 3))
         starts = np.zeros((len(paths.number), 3))
-        _advance(
+        _in_threads(
+            len(paths.number),
             shape,
             surface,
             environment,
@@ -301,6 +313,20 @@ def _trace_block(scene, shape, surface, environment, paths, samples, offset, uni
             break
         paths = _Paths(*(array[alive] for array in paths))
     return gathered, met, rays
+
+
+def _in_threads(count: int, *arguments: Any) -> None:
+    """Advance paths 0 to count, a part in each thread: numba's own parallel loops take no nested
+    tuples."""
+    workers = numba.get_num_threads()
+    borders = np.linspace(0, count, workers + 1).astype(np.int64)
+    with ThreadPoolExecutor(workers) as threads:
+        parts = [
+            threads.submit(_advance, first, last, *arguments)
+            for first, last in zip(borders[:-1], borders[1:], strict=True)
+        ]
+        for part in parts:
+            part.result()
 
 
 # ---- numbers -----------------------------------------------------------------------------------
@@ -385,19 +411,21 @@ def _scratch(surface, axis, facing, x, y, width, u, v):  # type: ignore[no-untyp
     """The scratch at a point of the tile: (whether, place across, its direction in the tile)."""
     chosen, covering = -1, 0
     place, angle = 0.0, 0.0
-    level = np.floor(np.log2(max(width * surface.coverage.resolution, 1e-9)) + v)
+    level = np.floor(np.log2(max(width * surface.resolution, 1e-9)) + v)
     state = _mixed(np.uint64(u * 4503599627370496.0) + np.uint64(77))
-    for layer in range(len(surface.features.angle)):
+    for layer in range(len(surface.layers.angle)):
         # Each side of each axis has its own part of the tile.
         sx = x + 0.37 * axis + 0.11 * facing
         sy = y + 0.61 * axis + 0.23 * facing
         state = _mixed(state + np.uint64(0x9E3779B97F4A7C15))
         if level < 0:
-            opacity, across, direction = scratch_at(surface.features, layer, sx, sy)
+            opacity, across, direction = scratch_at(surface.layers, layer, sx, sy)
         else:
-            opacity = filtered_coverage(surface.coverage, layer, int(level), sx, sy)
+            opacity = filtered_coverage(
+                surface.coverage, surface.offsets, surface.resolution, layer, int(level), sx, sy
+            )
             across = 2.0 * _unit(_mixed(state + np.uint64(3))) - 1.0
-            direction = np.float64(surface.features.angle[layer])
+            direction = np.float64(surface.layers.angle[layer])
         if _unit(state) < opacity:
             covering += 1
             # One of those at random: the n-th replaces the last choice with chance 1 / n.
@@ -406,8 +434,10 @@ def _scratch(surface, axis, facing, x, y, width, u, v):  # type: ignore[no-untyp
     return chosen >= 0, place, angle
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _advance(  # type: ignore[no-untyped-def]
+    first,
+    last,
     shape,
     surface,
     environment,
@@ -426,7 +456,7 @@ def _advance(  # type: ignore[no-untyped-def]
     towards,
     offered,
 ):
-    for i in prange(len(distance)):
+    for i in range(first, last):
         _event(
             shape,
             surface,
