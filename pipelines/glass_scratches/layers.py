@@ -49,7 +49,7 @@ FloatArray = NDArray[np.float32]
 _LONGEST, _WIDEST = 0.5, 0.5
 _LONGEST_ARC, _WIDEST_ARC = 0.45, 0.2
 
-_DIG_SIZE = 1.0
+_DIG_SIZE = 0.4
 """Radius of a pit over that of a circle with a scratch's area."""
 
 _MOST_CELLS = 1024

@@ -616,6 +616,36 @@ def _even_direction(u1, u2):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _inward(environment, along, across, normal, index, pick, u1, u2):  # type: ignore[no-untyped-def]
+    """A direction into the glass, (u, v, n) with n < 0, and its density per steradian.
+
+    Half of them by the cosine; half aim at what is bright in the environment as seen through a face
+    parallel to this one, which is exact for a plate and good for thin walls. Lights on this side
+    stand for their mirror images.
+    """
+    if pick < 0.5:
+        iu, iv, i_n = _cosine_direction(u1, u2)
+        i_n = -i_n
+    else:
+        ex, ey, ez, _ = sample_direction(
+            environment.row_cdf, environment.column_cdf, environment.density, u1, u2
+        )
+        iu = (ex * along[0] + ey * along[1] + ez * along[2]) / index
+        iv = (ex * across[0] + ey * across[1] + ez * across[2]) / index
+        i_n = -np.sqrt(max(1.0 - iu * iu - iv * iv, 0.0))
+    density = -0.5 * i_n / np.pi
+    outer = 1.0 - index * index * (iu * iu + iv * iv)
+    if outer > 1e-9:  # it would leave through the parallel face
+        n = np.sqrt(outer)
+        seen = 0.0
+        for sign in (-1.0, 1.0):
+            way = index * (iu * along + iv * across) + sign * n * normal
+            seen += density_of(environment.density, way[0], way[1], way[2])
+        density += 0.5 * seen * index * index * -i_n / n
+    return iu, iv, i_n, density
+
+
+@njit(cache=True)
 def lean_factor(surface, u, v, n):  # type: ignore[no-untyped-def]
     """F of a view (u, v, n) by Eq. 3 and 4, with F = 1 at theta_o = pi / 2."""
     view = bin_of(v, n, len(surface.gamma))
@@ -722,19 +752,19 @@ def _scatter(  # type: ignore[no-untyped-def]
         gain /= out_chance
         paths.density[i] = density
     else:  # … or inside, evenly scattered
+        paths.density[i] = 0.0
+        gain = 1.0 - factor if side > 0.0 else 1.0 - (1.0 - surface.mean_factor) / surface.index**2
+        gain /= 1.0 - out_chance
         if uniform:
             iu, iv, i_n = _even_direction(u1, u2)
-            gain = 2.0 * i_n
+            gain *= 2.0 * i_n
+            i_n = -i_n
         else:
-            iu, iv, i_n = _cosine_direction(u1, u2)
-            gain = 1.0
-        if side > 0.0:
-            gain *= 1.0 - factor
-        else:
-            gain *= 1.0 - (1.0 - surface.mean_factor) / surface.index**2
-        gain /= 1.0 - out_chance
-        i_n = -i_n
-        paths.density[i] = 0.0
+            pick = (u_choice - out_chance) / (1.0 - out_chance)
+            iu, iv, i_n, density = _inward(
+                environment, along, across, normal, surface.index, pick, u1, u2
+            )
+            gain *= -i_n / np.pi / density if density > 0.0 else 0.0
     if gain <= 0.0 or i_n == 0.0:
         return False
     paths.way[i] = iu * along + iv * across + i_n * normal
