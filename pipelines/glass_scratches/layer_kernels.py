@@ -128,7 +128,7 @@ def _arc_point(u: float, v: float, curvature: float) -> tuple[float, float]:
 # ---- the scratch at a point --------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _state_along(arrays: LayerArrays, i: int, s: float) -> tuple[float, float]:
     """Opacity and relative width of feature i at s = u / half_length; width 0 is a gap."""
     opacity, wide = float(arrays.shapes[i, STRENGTH]), 1.0
@@ -150,7 +150,7 @@ def _state_along(arrays: LayerArrays, i: int, s: float) -> tuple[float, float]:
     return opacity, wide
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def nearest_feature(
     arrays: LayerArrays, layer: int, x: float, y: float
 ) -> tuple[int, float, float, float]:
@@ -172,12 +172,12 @@ def nearest_feature(
         dy -= math.floor(dy + 0.5)
         px = shapes[i, COSINE] * dx + shapes[i, SINE] * dy
         py = shapes[i, COSINE] * dy - shapes[i, SINE] * dx
-        curvature, half_length, half_width = shapes[i, CURVATURE], shapes[i, HALF_LENGTH], shapes[i, HALF_WIDTH]
-        v = _across_arc(px, py, curvature) / half_width
+        curvature = shapes[i, CURVATURE]
+        v = _across_arc(px, py, curvature) / shapes[i, HALF_WIDTH]
         if v * v >= best:
             continue
         u = _along_arc(px, py, curvature)
-        s = u / half_length
+        s = u / shapes[i, HALF_LENGTH]
         if s * s + v * v >= best:
             continue
         strength, wide = _state_along(arrays, i, s)
@@ -190,7 +190,7 @@ def nearest_feature(
     return found, opacity, max(-1.0, min(across, 1.0)), along
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def scratch_at(arrays: LayerArrays, layer: int, x: float, y: float) -> tuple[float, float, float]:
     """Opacity in [0, 1], place across in [-1, 1] and direction (radians) of a layer at a point.
 

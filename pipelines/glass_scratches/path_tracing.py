@@ -53,6 +53,7 @@ _ROULETTE_FROM = 5
 _STRATIFIED = 4
 _LEAST_REFLECTED = 0.25
 _OFFSET = 2e-4
+_MOST_FLATS = 4
 _SCATTERED_ANGLE = 0.3
 """Opening angle of the cone that stands for a path's width after it was scattered, radians."""
 
@@ -89,8 +90,12 @@ class Picture(NamedTuple):
 
 
 class _Solid(NamedTuple):
+    """``normals`` (F, 3), ``corner_normals`` (F, 3, 3) of the triangles; ``flats`` (K, 3): axes
+    along which at least a hundredth of the surface faces, either way."""
+
     normals: NDArray[np.float32]
     corner_normals: NDArray[np.float32]
+    flats: NDArray[np.float64]
 
 
 class _Paths(NamedTuple):
@@ -171,8 +176,11 @@ def trace(
     scene = build_scene(solid.vertices, solid.triangles)
     corners = np.asarray(solid.vertices)[solid.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    shape = _Solid(normals.astype(np.float32), solid.corner_normals.astype(np.float32))
+    areas = np.linalg.norm(normals, axis=1)
+    normals /= areas[:, None]
+    shape = _Solid(
+        normals.astype(np.float32), solid.corner_normals.astype(np.float32), _flats(normals, areas)
+    )
     size = float(np.linalg.norm(np.ptp(np.asarray(solid.vertices), axis=0)))
     view = _view(camera, width, height)
     pixels_a_block = max(1, _BLOCK // samples)
@@ -204,6 +212,18 @@ def trace(
     return Picture(
         radiance.reshape(*grid, 3), variance.reshape(grid), scratched.reshape(grid), rays
     )
+
+
+def _flats(normals: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Axes (K, 3) along which at least a hundredth of the area faces, within a degree."""
+    free, found = np.ones(len(normals), np.bool_), []
+    for face in np.argsort(-areas)[:64]:
+        if free[face]:
+            alike = free & (np.abs(normals @ normals[face]) > np.cos(np.radians(1.0)))
+            free &= ~alike
+            if areas[alike].sum() > 0.01 * areas.sum():
+                found.append(normals[face])
+    return np.array(found[:_MOST_FLATS]).reshape(-1, 3)
 
 
 class _View(NamedTuple):
@@ -549,6 +569,7 @@ def _event(  # type: ignore[no-untyped-def]
         goes_on = _scatter(
             surface,
             environment,
+            shape.flats,
             paths,
             i,
             normal,
@@ -616,33 +637,62 @@ def _even_direction(u1, u2):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _inward(environment, along, across, normal, index, pick, u1, u2):  # type: ignore[no-untyped-def]
+def _inward(  # type: ignore[no-untyped-def]
+    environment, flats, along, across, normal, index, pick, u1, u2
+):
     """A direction into the glass, (u, v, n) with n < 0, and its density per steradian.
 
-    Half of them by the cosine; half aim at what is bright in the environment as seen through a face
-    parallel to this one, which is exact for a plate and good for thin walls. Lights on this side
-    stand for their mirror images.
+    Half of them by the cosine; half aim at what is bright in the environment as it is seen through
+    a face parallel to this one, or to one of the solid's flat faces. Total reflection on the way
+    only mirrors: for a plate that covers whatever becomes of the light, for thin walls most of it.
     """
+    axes = 1
+    for flat in range(len(flats)):
+        if abs((flats[flat] * normal).sum()) < 0.99:
+            axes += 1
+    way = np.zeros(3)
     if pick < 0.5:
         iu, iv, i_n = _cosine_direction(u1, u2)
-        i_n = -i_n
+        way[:] = iu * along + iv * across - i_n * normal
     else:
         ex, ey, ez, _ = sample_direction(
             environment.row_cdf, environment.column_cdf, environment.density, u1, u2
         )
-        iu = (ex * along[0] + ey * along[1] + ez * along[2]) / index
-        iv = (ex * across[0] + ey * across[1] + ez * across[2]) / index
-        i_n = -np.sqrt(max(1.0 - iu * iu - iv * iv, 0.0))
-    density = -0.5 * i_n / np.pi
-    outer = 1.0 - index * index * (iu * iu + iv * iv)
-    if outer > 1e-9:  # it would leave through the parallel face
-        n = np.sqrt(outer)
-        seen = 0.0
-        for sign in (-1.0, 1.0):
-            way = index * (iu * along + iv * across) + sign * n * normal
-            seen += density_of(environment.density, way[0], way[1], way[2])
-        density += 0.5 * seen * index * index * -i_n / n
-    return iu, iv, i_n, density
+        way[0], way[1], way[2] = ex, ey, ez
+        axis = _axis(flats, normal, min(int((pick - 0.5) * 2.0 * axes), axes - 1))
+        outer = (way * axis).sum()
+        way = (way - outer * axis) / index
+        way += np.sign(outer) * np.sqrt(max(1.0 - (way * way).sum(), 0.0)) * axis
+        below = (way * normal).sum()
+        if below > 0.0:
+            way -= 2.0 * below * normal
+    below = -(way * normal).sum()
+    density = 0.5 * max(below, 0.0) / np.pi
+    for mirrored in range(2):
+        from_here = way + 2.0 * below * normal if mirrored else way
+        for number in range(axes):
+            axis = _axis(flats, normal, number)
+            inner = (from_here * axis).sum()
+            outer2 = 1.0 - index * index * (1.0 - inner * inner)
+            if outer2 > 1e-9:  # it would leave through such a face
+                outer = np.sqrt(outer2)
+                seen = index * (from_here - inner * axis) + np.sign(inner) * outer * axis
+                there = density_of(environment.density, seen[0], seen[1], seen[2])
+                density += 0.5 / axes * there * index * index * abs(inner) / outer
+    return (way * along).sum(), (way * across).sum(), -below, density
+
+
+@njit(cache=True)
+def _axis(flats, normal, number):  # type: ignore[no-untyped-def]
+    """The surface's own normal, then those of flat faces that are not parallel to it."""
+    if number == 0:
+        return normal
+    for flat in range(len(flats)):
+        if abs((flats[flat] * normal).sum()) < 0.99:
+            number -= 1
+            if number == 0:
+                return flats[flat]
+    return normal
 
 
 @njit(cache=True)
@@ -658,6 +708,7 @@ def lean_factor(surface, u, v, n):  # type: ignore[no-untyped-def]
 def _scatter(  # type: ignore[no-untyped-def]
     surface,
     environment,
+    flats,
     paths,
     i,
     normal,
@@ -762,7 +813,7 @@ def _scatter(  # type: ignore[no-untyped-def]
         else:
             pick = (u_choice - out_chance) / (1.0 - out_chance)
             iu, iv, i_n, density = _inward(
-                environment, along, across, normal, surface.index, pick, u1, u2
+                environment, flats, along, across, normal, surface.index, pick, u1, u2
             )
             gain *= -i_n / np.pi / density if density > 0.0 else 0.0
     if gain <= 0.0 or i_n == 0.0:
