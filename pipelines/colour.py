@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of linear R, G, B in the luminance Y (ITU-R BT.709; also the sRGB primaries)."""
+_AIM = 0.8
+"""Radiance that the brighter part of a picture is exposed to."""
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
@@ -26,6 +28,12 @@ def decode_srgb(encoded: ArrayLike) -> NDArray[np.float64]:
 def to_8bit(linear: ArrayLike) -> NDArray[np.uint8]:
     """Linear light to 8-bit sRGB, rounded to the nearest code."""
     return np.rint(encode_srgb(linear) * 255.0).astype(np.uint8)
+
+
+def exposure(radiance: NDArray[np.floating]) -> float:
+    """Factor that brings the 99 % quantile of radiance (any shape) to 0.8."""
+    bright = float(np.quantile(np.maximum(radiance.astype(np.float32), 0.0), 0.99))
+    return _AIM / max(bright, 1e-6)
 
 
 def luminance(rgb: NDArray[np.floating]) -> NDArray[np.floating]:

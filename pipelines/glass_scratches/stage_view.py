@@ -7,7 +7,6 @@ what is seen through the glass is not what the inside of the glass does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,9 +105,9 @@ class ScratchedActor:
 in vec3 shadingOut; flat in vec3 facingOut; in vec3 placeOut;
 const float PI = 3.14159265;
 const float directions[{count}] = float[{count}]({angles});
-vec3 skyAt(vec3 d) {{
-  return textureLod(sky, vec2(0.5 - atan(d.y, d.x) / (2.0 * PI), 0.5 + asin(d.z) / PI), 0.0).rgb;
-}}
+// A macro: the textures are declared further down.
+#define SKY_AT(d) \\
+  textureLod(sky, vec2(0.5 - atan((d).y, (d).x) / (2.0 * PI), 0.5 + asin((d).z) / PI), 0.0).rgb
 float angleOf(vec3 d, vec3 across, vec3 up) {{
   return atan(dot(d, across), max(dot(d, up), 0.0)) / PI + 0.5;
 }}
@@ -123,7 +122,9 @@ float angleOf(vec3 d, vec3 across, vec3 up) {{
   float base = {((self._index - 1) / (self._index + 1)) ** 2!r};
   float mirrored = base + (1.0 - base) * pow(1.0 - cosine, 5.0);
   vec3 bent = refract(-view, normal, {1.0 / self._index!r});
-  vec3 seen = mix(skyAt(normalize(mix(bent, -view, 0.5))), skyAt(reflect(-view, normal)), mirrored);
+  vec3 straight = normalize(mix(bent, -view, 0.5));
+  vec3 back = reflect(-view, normal);
+  vec3 seen = mix(SKY_AT(straight), SKY_AT(back), mirrored);
 
   vec3 share = pow(abs(facingOut), vec3(4.0));
   share /= share.x + share.y + share.z;
@@ -187,25 +188,6 @@ def draw(
         stage.add(actor.actor(environment, camera))
         stage.look(camera)
         return stage.radiance()
-
-
-def turning(
-    actor: ScratchedActor,
-    environments: Iterator[Sampler],
-    count: int,
-    camera: Camera,
-    *,
-    width: int,
-    height: int,
-    progress: Callable[[float], None],
-) -> NDArray[np.float32]:
-    """Pictures (count, height, width, 3) of linear radiance, one for each environment."""
-    pictures = []
-    for number, environment in enumerate(environments):
-        progress(number / count)
-        drawn = draw(actor, environment, camera, width=width, height=height, supersampling=2)
-        pictures.append(drawn[..., :3])
-    return np.stack(pictures)
 
 
 def _lights(environment: Sampler) -> tuple[NDArray[np.float32], float]:

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import to_8bit
+from pipelines.colour import exposure, to_8bit
 from pipelines.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.pictures import exposure
 from pipelines.stage import Camera, Shader, Stage, orbit, surface
 
 BACKGROUND = (0.02, 0.022, 0.026)

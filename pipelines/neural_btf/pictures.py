@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import to_8bit
+from pipelines.colour import exposure, to_8bit
 from pipelines.contact_sheet import contact_sheet
 from pipelines.directions import Pairs, angles_between, unit_vectors
+from pipelines.plots import drawn, new_figure
 
-_AIM = 0.8
-"""Radiance that the brighter part of a picture is exposed to."""
 _DIFFERENCE_TIMES = 4
 _SHOWN_PAIRS = ((0, 0, 0, 0), (0, 0, 45, 90), (0, 0, 60, 0), (60, 0, 30, 180), (60, 90, 60, 90),
                 (75, 270, 75, 90))  # fmt: skip
@@ -21,12 +19,6 @@ _SHOWN_PAIRS = ((0, 0, 0, 0), (0, 0, 45, 90), (0, 0, 60, 0), (60, 0, 30, 180), (
 PAPER_PAIRS = ((15, 60, 30, 60), (75, 345, 45, 0))
 """View and light of figure 7, in degrees. The paper's second light has theta = 345°, which cannot
 be; 45° stands in for it, as the light's phi there is 0."""
-
-
-def exposure(radiance: NDArray[np.floating]) -> float:
-    """Factor that brings the 99 % quantile of radiance (any shape) to 0.8."""
-    bright = float(np.quantile(np.maximum(radiance.astype(np.float32), 0.0), 0.99))
-    return _AIM / max(bright, 1e-6)
 
 
 def nearest_images(
@@ -62,7 +54,7 @@ def restored_picture(
 
     A row has one exposure, from the original; the difference is absolute, as brightness.
     """
-    figure, canvas = _figure(8.4, 2.9 * len(original))
+    figure, canvas = new_figure(8.4, 2.9 * len(original))
     axes = figure.subplots(len(original), 3, squeeze=False)
     for row, (measured, given, light, view) in enumerate(
         zip(original, restored, pairs.light, pairs.view, strict=True)
@@ -82,7 +74,7 @@ def restored_picture(
             axis.imshow(picture, interpolation="nearest")
             axis.set_title(title, fontsize=9)
             axis.set_axis_off()
-    return _drawn(canvas)
+    return drawn(canvas)
 
 
 def cluster_map(ids: NDArray[np.integer], height: int, width: int) -> NDArray[np.uint8]:
@@ -95,19 +87,19 @@ def cluster_map(ids: NDArray[np.integer], height: int, width: int) -> NDArray[np
 
 def loss_curve(step: NDArray[np.integer], rmse: NDArray[np.floating]) -> NDArray[np.uint8]:
     """RMSE of the batches over the steps of training, on a logarithmic axis."""
-    figure, canvas = _figure(5.4, 3.2)
+    figure, canvas = new_figure(5.4, 3.2)
     axis = figure.subplots()
     axis.plot(step, rmse, color="tab:blue")
     axis.set(xlabel="step", ylabel="RMSE of the batches, over alpha", yscale="log")
     axis.grid(alpha=0.3, which="both")
-    return _drawn(canvas)
+    return drawn(canvas)
 
 
 def error_picture(
     rmse_texel: NDArray[np.floating], rmse_image: NDArray[np.floating], pairs: Pairs
 ) -> NDArray[np.uint8]:
     """Errors of the texels as a map, and of views and lights on the hemisphere seen from above."""
-    figure, canvas = _figure(10.5, 3.4)
+    figure, canvas = new_figure(10.5, 3.4)
     left, middle, right = figure.subplots(1, 3)
     shown = left.imshow(rmse_texel, cmap="magma", interpolation="nearest", vmin=0.0)
     left.set_title("RMSE of every texel", fontsize=9)
@@ -122,7 +114,7 @@ def error_picture(
         axis.set(aspect="equal", xlim=(-1.1, 1.1), ylim=(-1.1, 1.1))
         axis.set_axis_off()
         figure.colorbar(points, ax=axis)
-    return _drawn(canvas)
+    return drawn(canvas)
 
 
 def wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
@@ -133,16 +125,3 @@ def wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
 def _words(direction: NDArray[np.floating]) -> str:
     theta, phi = np.degrees(direction)
     return f"({theta:.3g}°, {phi:.3g}°)"
-
-
-def _figure(width: float, height: float) -> tuple[Any, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    return figure, FigureCanvasAgg(figure)
-
-
-def _drawn(canvas: Any) -> NDArray[np.uint8]:
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].copy()

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.photo_fur.attenuation import Attenuation
+from pipelines.plots import drawn, new_figure
 
 
 def decay_picture(
@@ -15,11 +16,7 @@ def decay_picture(
     boundaries: NDArray[np.float64],
 ) -> NDArray[np.uint8]:
     """The histogram with Imax and Imin, and I(h) with the layers' boundaries, side by side."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 3.4), dpi=110, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    figure, canvas = new_figure(9, 3.4)
     left, right = figure.subplots(1, 2)
     shown = np.minimum(edges, 1.0)
     left.stairs(counts, shown, fill=True, color="0.6")
@@ -41,8 +38,7 @@ def decay_picture(
     right.plot(np.arange(layers + 1) / layers, boundaries, "o", color="tab:red", markersize=4)
     right.set(xlabel="depth / thickness", ylabel="luminance (linear)", xlim=(0, 1), ylim=(0, None))
     right.set_title(f"I(h) = Imax exp(-{attenuation.coefficient:.3g} h), {layers} layers")
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    return drawn(canvas)
 
 
 def layer_picture(layer: NDArray[np.uint8], layers: int) -> NDArray[np.uint8]:
