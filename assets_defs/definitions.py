@@ -8,6 +8,7 @@ from typing import Any
 
 import dagster as dg
 
+from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.inbox import inbox_sensor
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
@@ -16,7 +17,7 @@ from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from storage.io_manager import ZarrIOManager
 
-SYSTEMS: dict[str, System] = {system.name: system for system in (FUR, BTF)}
+SYSTEMS: dict[str, System] = {system.name: system for system in (FUR, BTF, SCRATCHES)}
 
 
 def build_definitions(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Mapping
+from pathlib import Path
 from types import UnionType
 from typing import Any, ClassVar, Literal, Self, Union
 
@@ -18,6 +19,11 @@ import pydantic
 Preset = Literal["test", "demo", "paper"]
 PRESETS: tuple[Preset, ...] = typing.get_args(Preset)
 DEFAULT_PRESET: Preset = "demo"
+
+
+UserFile = "user file"
+"""Mark of a field, ``Annotated[str, UserFile]``, that may name a file of the user's: what the file
+holds then counts like a setting."""
 
 
 class SettingsError(ValueError):
@@ -35,6 +41,15 @@ class Settings(pydantic.BaseModel):
     def preset(cls, name: Preset, keys: Mapping[str, str]) -> Self:
         """The settings of a preset for a partition (``{"photo": "grass"}``)."""
         return cls(**cls.sizes.get(name, {}))
+
+    def files(self) -> dict[str, Path]:
+        """The files that settings name, by field."""
+        named = {
+            name: Path(str(getattr(self, name)))
+            for name, field in type(self).model_fields.items()
+            if UserFile in field.metadata
+        }
+        return {name: path for name, path in named.items() if path.is_file()}
 
 
 def resolve(

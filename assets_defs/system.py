@@ -400,13 +400,17 @@ def provenance(
     what has it already. ``lineage`` leaves out code and content: versions of equal lineage were
     asked for in the same way, so their figures may be compared.
     """
-    chosen = settings.model_dump(mode="json")
+    stored = settings.model_dump(mode="json")
+    chosen = dict(stored)
+    files = {name: Source("", path).fingerprint for name, path in settings.files().items()}
+    if files:
+        chosen |= {"files": files}
     contents = {name: record["content"] for name, record in inputs.items()}
     lineages = {name: record["lineage"] for name, record in inputs.items()}
     return {
         "asset": f"{plan.schema.system}/{plan.name}",
         "schema": plan.schema.number,
-        "settings": chosen,
+        "settings": stored,
         "source": source,
         "code": plan.code,
         "inputs": [

@@ -76,9 +76,7 @@ def taut_strings(
     before, after = np.diff(profile, axis=0)[:-1], np.diff(profile, axis=0)[1:]
     outward = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0
     bends = np.vstack([profile[:1], profile[1:-1][outward], profile[-1:]])
-    inner = np.array(
-        [int(np.argmin(np.hypot(*(ends - bend).T))) for bend in bends], dtype=np.int64
-    )
+    inner = np.array([int(np.argmin(np.hypot(*(ends - bend).T))) for bend in bends], dtype=np.int64)
     seen = _seen(ends, profile)
     direct = np.where(seen, _distances(ends), np.inf)
     among = direct[np.ix_(inner, inner)]

@@ -116,13 +116,3 @@ def moving_light(
         drawn = draw(actor, turned, camera, width=size, height=size, supersampling=2)
         pictures.append(drawn[..., :3])
     return to_8bit(np.stack(pictures) * exposure(np.stack(pictures)))
-
-
-def excess(picture: Picture, block: int = 8) -> float:
-    """How far the brightest block x block pixels lie above radiance 1, in standard errors (and
-    at least a thousandth of radiance)."""
-    height, width = (side - side % block for side in picture.variance.shape)
-    shape = (height // block, block, width // block, block)
-    mean = picture.radiance.mean(axis=2)[:height, :width].reshape(shape).mean(axis=(1, 3))
-    variance = picture.variance[:height, :width].reshape(shape).sum(axis=(1, 3)) / block**4
-    return float(((mean - 1) / np.maximum(np.sqrt(variance), 1e-3)).max())

@@ -128,45 +128,55 @@ def _arc_point(u: float, v: float, curvature: float) -> tuple[float, float]:
 # ---- the scratch at a point --------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _state_along(arrays: LayerArrays, i: int, s: float) -> tuple[float, float]:
-    """Opacity and relative width of feature i at s = u / half_length; width 0 is a gap."""
-    opacity, wide = float(arrays.shapes[i, STRENGTH]), 1.0
-    if arrays.is_dig[i]:
+# Numba counts references to the arrays that are taken out of a tuple, and leaves the counting out
+# only of functions without branches: those that take the tuple are such, and hand the arrays on to
+# others. (Three times as fast.)
+
+
+@njit(cache=True, error_model="numpy")
+def _state_along(
+    strength: float, seed: int, is_dig: bool, fading: float, breaks: float, s: float
+) -> tuple[float, float]:
+    """Opacity and relative width of a feature at s = u / half_length; width 0 is a gap."""
+    opacity, wide = strength, 1.0
+    if is_dig:
         return opacity, wide
-    seed = arrays.seed[i]
     place = 0.5 * KNOTS * (s + 1.0) + _hashed(seed, -1)
-    if arrays.breaks > 0.0:
-        left = (noise_along(seed, place) - arrays.breaks) / (_TIP * (1.0 - arrays.breaks))
+    if breaks > 0.0:
+        left = (noise_along(seed, place) - breaks) / (_TIP * (1.0 - breaks))
         if left <= 0.0:
             return 0.0, 0.0
         if left < 1.0:
             wide = math.sqrt(left * (2.0 - left))
-    if arrays.fading > 0.0:
+    if fading > 0.0:
         # Strong where it was begun, gone where the tool left the surface: one end or the other.
         way = 0.5 + 0.5 * (s if seed & 1 else -s)
         kept = (1.0 - way * way) * (1.0 - _WAVER * noise_along(seed ^ 0x5BD1E995, place))
-        opacity *= 1.0 - arrays.fading * (1.0 - kept)
+        opacity *= 1.0 - fading * (1.0 - kept)
     return opacity, wide
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def nearest_feature(
-    arrays: LayerArrays, layer: int, x: float, y: float
+@njit(cache=True, error_model="numpy")
+def _nearest(
+    shapes: NDArray[np.float32],
+    seed: NDArray[np.uint32],
+    is_dig: NDArray[np.bool_],
+    cells: int,
+    cell_start: NDArray[np.int64],
+    cell_items: NDArray[np.int32],
+    fading: float,
+    breaks: float,
+    layer: int,
+    x: float,
+    y: float,
 ) -> tuple[int, float, float, float]:
-    """Find the feature of a layer with the smallest normalised distance (< 1) at a point.
-
-    Returns its number or -1, opacity, place across it in [-1, 1] and u.
-    """
     x -= math.floor(x)
     y -= math.floor(y)
-    cells = arrays.cells
     column, row = min(int(x * cells), cells - 1), min(int(y * cells), cells - 1)
     cell = (layer * cells + row) * cells + column
-    shapes = arrays.shapes  # no views of rows: they would be counted references
     best, found, opacity, across, along = 1.0, -1, 0.0, 0.0, 0.0
-    for k in range(arrays.cell_start[cell], arrays.cell_start[cell + 1]):
-        i = arrays.cell_items[k]
+    for k in range(cell_start[cell], cell_start[cell + 1]):
+        i = cell_items[k]
         dx, dy = x - shapes[i, X], y - shapes[i, Y]
         dx -= math.floor(dx + 0.5)
         dy -= math.floor(dy + 0.5)
@@ -180,14 +190,40 @@ def nearest_feature(
         s = u / shapes[i, HALF_LENGTH]
         if s * s + v * v >= best:
             continue
-        strength, wide = _state_along(arrays, i, s)
+        state, wide = _state_along(shapes[i, STRENGTH], seed[i], is_dig[i], fading, breaks, s)
         if wide <= 0.0:
             continue
         distance = s * s + (v / wide) ** 2
         if distance < best:
-            best, found, opacity, along = distance, i, strength, u
+            best, found, opacity, along = distance, i, state, u
             across = v / (wide * math.sqrt(1.0 - s * s))
     return found, opacity, max(-1.0, min(across, 1.0)), along
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def nearest_feature(
+    arrays: LayerArrays, layer: int, x: float, y: float
+) -> tuple[int, float, float, float]:
+    """Find the feature of a layer with the smallest normalised distance (< 1) at a point.
+
+    Returns its number or -1, opacity, place across it in [-1, 1] and u.
+    """
+    return _nearest(
+        arrays.shapes, arrays.seed, arrays.is_dig, arrays.cells, arrays.cell_start,
+        arrays.cell_items, arrays.fading, arrays.breaks, layer, x, y,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _direction(
+    angle: NDArray[np.float32],
+    turn: NDArray[np.float32],
+    shapes: NDArray[np.float32],
+    layer: int,
+    i: int,
+    along: float,
+) -> float:
+    return angle[layer] + turn[i] + shapes[i, CURVATURE] * along if i >= 0 else 0.0
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -198,10 +234,8 @@ def scratch_at(arrays: LayerArrays, layer: int, x: float, y: float) -> tuple[flo
     a pit's is a random one. Where there is no scratch all three are 0.
     """
     i, opacity, across, along = nearest_feature(arrays, layer, x, y)
-    if i < 0:
-        return 0.0, 0.0, 0.0
-    turned = arrays.turn[i] + arrays.shapes[i, CURVATURE] * along
-    return opacity, across, arrays.angle[layer] + turned
+    turned = _direction(arrays.angle, arrays.turn, arrays.shapes, layer, i, along)
+    return opacity, across, turned
 
 
 # ---- the search grid ---------------------------------------------------------------------------

@@ -38,7 +38,9 @@ def stages(spec: LayerSpec, seed: int, size: int) -> NDArray[np.uint8]:
     return np.stack(shown).round().astype(np.uint8).reshape(3, size, size)
 
 
-def layers_picture(coverage: NDArray[np.float32], angles: NDArray[np.floating]) -> NDArray[np.uint8]:
+def layers_picture(
+    coverage: NDArray[np.float32], angles: NDArray[np.floating]
+) -> NDArray[np.uint8]:
     """All layers (L, R, R) in one picture (R, R, 3), each in the colour of its direction."""
     picture = np.zeros((*coverage.shape[1:], 3))
     for layer, angle in zip(coverage, angles, strict=True):

@@ -49,7 +49,9 @@ class LayerSpec:
         _check(0.0 < self.width <= 1.0, "width", self.width, "more than 0 and at most 1")
         _check(0.0 < self.threshold <= 0.5, "threshold", self.threshold, "more than 0, at most 0.5")
         if self.coverage is not None:
-            _check(0.0 < self.coverage <= 0.6, "coverage", self.coverage, "more than 0, at most 0.6")
+            _check(
+                0.0 < self.coverage <= 0.6, "coverage", self.coverage, "more than 0, at most 0.6"
+            )
         _check(1 <= self.layers <= MOST_LAYERS, "layers", self.layers, f"1 to {MOST_LAYERS}")
         _check(
             0.0 <= self.curvature <= math.pi / 2, "curvature", self.curvature, "0 to pi / 2 radians"

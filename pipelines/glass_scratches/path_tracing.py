@@ -263,9 +263,7 @@ def _placed(camera: Camera) -> tuple[tuple[float, float, float], tuple[float, fl
     return camera.position, camera.target
 
 
-def _start(
-    view: _View, pixels: NDArray[np.int64], width: int, samples: int, seed: int
-) -> _Paths:
+def _start(view: _View, pixels: NDArray[np.int64], width: int, samples: int, seed: int) -> _Paths:
     count = len(pixels) * samples
     jitter = np.empty((count, 2))
     seeds = np.empty(count, np.uint64)
@@ -761,8 +759,10 @@ def _scatter(  # type: ignore[no-untyped-def]
         i_n = ex * normal[0] + ey * normal[1] + ez * normal[2]
         if i_n > 0.0 and density > 0.0:
             if side > 0.0:
-                scale = factor * i_n * sampling.evaluate(
-                    lobe.rho, lobe.blur, part, ou, ov, on, iu, iv, i_n
+                scale = (
+                    factor
+                    * i_n
+                    * sampling.evaluate(lobe.rho, lobe.blur, part, ou, ov, on, iu, iv, i_n)
                 )
                 own = sampling.pdf(lobe.rho, lobe.share, lobe.blur, part, ou, ov, on, iu, iv, i_n)
             else:
@@ -791,7 +791,9 @@ def _scatter(  # type: ignore[no-untyped-def]
         elif side > 0.0:
             # Its own third number, where the lean is drawn evenly.
             u3 = _unit(_mixed(seed + np.uint64((depth + 1) * samples + number % samples)))
-            iu, iv, i_n = sampling.sample(lobe.cdf, lobe.sines, lobe.blur, part, ou, ov, on, u1, u2, u3)
+            iu, iv, i_n = sampling.sample(
+                lobe.cdf, lobe.sines, lobe.blur, part, ou, ov, on, u1, u2, u3
+            )
             gain = returned
             density = out_chance * sampling.pdf(
                 lobe.rho, lobe.share, lobe.blur, part, ou, ov, on, iu, iv, i_n

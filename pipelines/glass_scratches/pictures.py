@@ -25,7 +25,7 @@ def profile_picture(points: NDArray[np.float64]) -> NDArray[np.uint8]:
     return drawn(canvas)
 
 
-def table_picture(points: NDArray[np.float64], rho: NDArray[np.float64]) -> NDArray[np.uint8]:
+def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
     """The table as an image, and figure 2: rho_m over phi_o around three incidences."""
     figure, canvas = new_figure(10.0, 4.2)
     angles = bin_centres(len(rho))
@@ -53,6 +53,23 @@ def table_picture(points: NDArray[np.float64], rho: NDArray[np.float64]) -> NDAr
         right.fill(angles, lobe, color=colour, alpha=0.12)
     right.set_ylim(0.0, float(np.quantile(rho, 0.995)) * 1.1)
     right.legend(loc="lower center", fontsize=8)
+    return drawn(canvas)
+
+
+def lean_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Fresnel's factor over the lean as it is interpolated, for three views phi_o."""
+    figure, canvas = new_figure(5.4, 3.4)
+    axis = figure.subplots()
+    theta = np.linspace(0.0, np.pi / 2, 200)
+    angles = bin_centres(len(gamma))
+    for view in _SHOWN_INCIDENCES:
+        at = int(np.argmin(np.abs(angles - np.radians(view))))
+        share = (2 * theta / np.pi) ** gamma[at]
+        curve = share * factor[2, at] + (1 - share) * factor[0, at]
+        axis.plot(np.degrees(theta), curve, label=f"φo = {view:g}°, γ = {gamma[at]:.3g}")
+        axis.plot([0, 60, 90], factor[:, at], "o", color="0.3", markersize=4)
+    axis.set(xlabel="θo, degrees", ylabel="ρs / ρm", ylim=(0, 1.05))
+    axis.legend(fontsize=8)
     return drawn(canvas)
 
 

@@ -139,9 +139,9 @@ def _first_crossing(ring: NDArray[np.float64]) -> tuple[int, int] | None:
             along = (offset[:, 0] * step[others, 1] - offset[:, 1] * step[others, 0]) / cross
             along_other = (offset[:, 0] * step[one, 1] - offset[:, 1] * step[one, 0]) / cross
         near = 1e-12
-        meets = (
-            (along >= -near) & (along <= 1 + near) & (along_other >= -near)
-        ) & (along_other <= 1 + near)
+        meets = ((along >= -near) & (along <= 1 + near) & (along_other >= -near)) & (
+            along_other <= 1 + near
+        )
         neighbour = (others == one + 1) | ((one == 0) & (others == count - 1))
         meets &= ~neighbour
         # Parallel neighbours that fold back onto each other, and parallel pieces that overlap.

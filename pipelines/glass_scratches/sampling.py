@@ -52,15 +52,19 @@ def make_lobe(across: NDArray[np.float32], roughness: float) -> Lobe:
     running = np.cumsum(part, axis=-1) / np.where(share > 0, share, 1.0)[..., None]
     cdf = np.concatenate([np.zeros((*share.shape, 1)), running], axis=-1)
     cdf[..., -1] = 1.0
+    return lobe_of(across, cdf.astype(np.float32), share.astype(np.float32), roughness)
+
+
+def lobe_of(
+    across: NDArray[np.float32],
+    cdf: NDArray[np.float32],
+    share: NDArray[np.float32],
+    roughness: float,
+) -> Lobe:
+    """A lobe whose sums were made before. Raises ValueError for a roughness outside [0, 1]."""
     # Half: the quantile runs over (0, 1), the bounce's sine over (-1, 1).
     blur = max(blur_of(roughness) / 2, _LEAST_BLUR)
-    return Lobe(
-        across,
-        cdf.astype(np.float32),
-        share.astype(np.float32),
-        np.sin(bin_edges(bins)),
-        float(blur),
-    )
+    return Lobe(across, cdf, share, np.sin(bin_edges(across.shape[1])), float(blur))
 
 
 @njit(cache=True, inline="always")

@@ -1,0 +1,197 @@
+"""Where the scratches lie: `scratch_layers`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import Field
+
+from assets_defs.checks import Check, Checked
+from assets_defs.glass_scratches.declaration import SCRATCHES
+from assets_defs.settings import Preset, Settings
+from assets_defs.system import Metadata
+from storage.schemas import glass_scratches as schemas
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from pipelines.glass_scratches.layer_settings import LayerSpec
+    from pipelines.glass_scratches.layers import Layers
+
+    Pictures = dict[str, NDArray[np.uint8]]
+    Result = tuple[xr.Dataset, Metadata]
+
+_STAGE_SIZE = 256
+
+
+class LayerSettings(Settings):
+    """The scratches of a tile, the square that repeats over the object."""
+
+    length: float = Field(
+        0.3, gt=0.0, le=1.0, description="Length of a noise cell, tiles (table 1)"
+    )
+    width: float = Field(
+        0.001, gt=0.0, le=1.0, description="Width of a noise cell, tiles (table 1)"
+    )
+    threshold: float = Field(
+        0.1, gt=0.0, le=0.5, description="Cell noise below this is scratch; more is more scratches"
+    )
+    coverage: float | None = Field(
+        None, gt=0.0, le=0.6, description="Share of the area that each layer covers; overrides it"
+    )
+    layers: int = Field(4, ge=1, le=8, description="Layers, each with its own direction")
+    curvature: float = Field(
+        0.0, ge=0.0, le=1.5, description="Turn from end to end, radians (sigma)"
+    )
+    digs: float = Field(0.0, ge=0.0, le=1.0, description="Share of the scratches that are pits")
+    fading: float = Field(0.0, ge=0.0, le=1.0, description="How far scratches fade along them")
+    breaks: float = Field(0.0, ge=0.0, lt=1.0, description="Share of their length that is missing")
+    spread: float = Field(0.0, ge=0.0, le=1.5, description="Spread of length, width, depth (log)")
+    resolution: int = Field(512, ge=16, le=8192, description="Texels of the maps, a power of two")
+    layer_seed: int = Field(3, ge=0, description="Seed of the scratches")
+
+    @classmethod
+    def preset(cls, name: Preset, keys: Mapping[str, str]) -> Self:
+        """Table 1's settings, and one that the paper leaves open."""
+        looks: dict[str, Any] = {
+            "setting-2": {"length": 0.6, "width": 0.01},
+            "mirror": {"length": 0.6, "width": 0.01},
+            "worn": {
+                "length": 0.5,
+                "width": 0.005,
+                "coverage": 0.01,
+                "layers": 6,
+                "curvature": 0.5,
+                "digs": 0.15,
+                "fading": 0.7,
+                "breaks": 0.3,
+                "spread": 0.5,
+            },
+        }
+        sizes = {"test": {"resolution": 128}, "paper": {"resolution": 2048}}
+        return cls(**looks.get(keys["setting"], {}), **sizes.get(name, {}))
+
+
+def layer_spec(settings: LayerSettings) -> LayerSpec:
+    """The settings as the type of `pipelines`. Raises ValueError for a resolution that is no power
+    of two."""
+    from pipelines.glass_scratches.layer_settings import LayerSpec
+
+    if settings.resolution & (settings.resolution - 1):
+        raise ValueError(f"resolution is {settings.resolution}; expected a power of two.")
+    chosen = settings.model_dump(exclude={"resolution", "layer_seed"})
+    return LayerSpec(**chosen)
+
+
+def layers_of(dataset: xr.Dataset) -> Layers:
+    """The scratches of a `scratch_layers` dataset, with their search grid."""
+    from pipelines.glass_scratches.layers import join_features
+
+    columns = ("centre", "turn", "half_length", "half_width", "curvature", "strength", "seed")
+    return join_features(
+        dataset["angle"].values,
+        dataset["feature_layer"].values,
+        *(dataset[name].values for name in columns),
+        dataset["is_dig"].values,
+        fading=dataset.attrs["fading"],
+        breaks=dataset.attrs["breaks"],
+    )
+
+
+def _layer_pictures(dataset: xr.Dataset) -> Pictures:
+    import numpy as np
+
+    from pipelines.glass_scratches.layer_pictures import layers_picture
+
+    stages = np.hstack(list(dataset["stages"].values))
+    return {
+        "stages": np.repeat(stages[..., None], 3, axis=2),
+        "layers": layers_picture(dataset["coverage"].values, dataset["angle"].values),
+    }
+
+
+def _coverage_error(checked: Checked) -> float | None:
+    """Against what was asked for, or for a threshold against what Poisson points give."""
+    import numpy as np
+
+    settings = checked.record["settings"]
+    found = checked.dataset["coverage"].values.mean(axis=(1, 2), dtype=np.float64)
+    wanted = settings["coverage"]
+    if wanted is None:
+        plain = all(settings[name] == 0 for name in ("digs", "fading", "breaks", "spread"))
+        if not plain:
+            return None
+        wanted = 1 - np.exp(-np.pi * settings["threshold"] ** 2)
+    return float(np.abs(found / wanted - 1).mean())
+
+
+def _pyramid_error(checked: Checked) -> float:
+    """Largest difference of a layer's coverage by the map from that by the scratches themselves."""
+    import numpy as np
+
+    from pipelines.glass_scratches.layers import coverage_maps
+
+    maps = checked.dataset["coverage"].values
+    again = coverage_maps(layers_of(checked.dataset), maps.shape[1] // 2, 36)
+    half = maps.reshape(len(maps), again.shape[1], 2, again.shape[1], 2).mean(axis=(2, 4))
+    return float(np.sqrt(np.mean((half - again) ** 2)))
+
+
+@SCRATCHES.asset(
+    schemas.SCRATCH_LAYERS,
+    by=("setting",),
+    settings=LayerSettings,
+    pictures=_layer_pictures,
+    checks=(
+        Check(
+            "coverage_error",
+            "Relative difference of the layers' coverage from what was asked for, mean of layers.",
+            _coverage_error,
+            at_most=0.35,
+            change=0.01,
+        ),
+        Check(
+            "map_error",
+            "RMS difference of the coverage maps from the scratches sampled anew.",
+            _pyramid_error,
+            at_most=0.1,
+        ),
+    ),
+)
+def scratch_layers(settings: LayerSettings) -> Result:
+    """Scatter the scratches and map their coverage."""
+    import xarray as xr
+
+    from pipelines.glass_scratches.layer_pictures import stages
+    from pipelines.glass_scratches.layers import coverage_maps, make_layers
+
+    spec = layer_spec(settings)
+    made = make_layers(spec, settings.layer_seed)
+    maps = coverage_maps(made, settings.resolution)
+    feature = "feature"
+    variables = {
+        "angle": ("layer", made.angle),
+        "feature_layer": (feature, made.layer),
+        "centre": ((feature, "axis"), made.centre),
+        "turn": (feature, made.turn),
+        "half_length": (feature, made.half_length),
+        "half_width": (feature, made.half_width),
+        "curvature": (feature, made.curvature),
+        "strength": (feature, made.strength),
+        "seed": (feature, made.seed),
+        "is_dig": (feature, made.is_dig),
+        "coverage": (("layer", "y", "x"), maps),
+        "stages": (("stage", "row", "column"), stages(spec, settings.layer_seed, _STAGE_SIZE)),
+    }
+    features = sum(
+        array.nbytes for name, (_, array) in variables.items() if name not in ("coverage", "stages")
+    )
+    dataset = xr.Dataset(variables, attrs={"fading": spec.fading, "breaks": spec.breaks})
+    return dataset, {
+        "scratches": len(made.layer),
+        "bytes of the scratches": features,
+        "coverage of a layer, mean": float(maps.mean()),
+    }

@@ -1,0 +1,160 @@
+"""Figures that tables, layers and samplers are judged by."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.glass_scratches import sampling
+from pipelines.glass_scratches.bins import bin_weights
+from pipelines.glass_scratches.monte_carlo import shoot
+from pipelines.glass_scratches.sampling import Lobe
+
+BLOCKS = 16
+_INCIDENCES, _PATHS = 16, 20_000
+
+
+def block_means(rho: NDArray[np.float64], blocks: int = BLOCKS) -> NDArray[np.float64]:
+    """The table (M, M) averaged over blocks x blocks blocks of bins, weighted by the cosines."""
+    weight = bin_weights(len(rho))
+    size = len(rho) // blocks
+    shape = (blocks, size, blocks, size)
+    summed = (rho * weight[:, None] * weight).reshape(shape).sum(axis=(1, 3))
+    blocked = weight.reshape(blocks, size).sum(axis=1)
+    return summed / (blocked[:, None] * blocked)
+
+
+def reciprocity_error(rho: NDArray[np.float64], standard_error: NDArray[np.float64]) -> float:
+    """Largest difference of the block means from their transpose, beyond five standard errors, over
+    the largest block."""
+    blocks = min(BLOCKS, len(rho) // 2)
+    mean = block_means(rho, blocks)
+    error = np.sqrt(_block_variance(standard_error, blocks))
+    beyond = np.abs(mean - mean.T) - 5 * np.sqrt(error**2 + error.T**2)
+    return float(max(beyond.max(), 0.0) / mean.max())
+
+
+def _block_variance(standard_error: NDArray[np.float64], blocks: int) -> NDArray[np.float64]:
+    """Variance of block means, were the bins independent; they share their rays, which only makes
+    it smaller."""
+    weight = bin_weights(len(standard_error))
+    size = len(weight) // blocks
+    part = (standard_error * weight[:, None] * weight) ** 2
+    summed = part.reshape(blocks, size, blocks, size).sum(axis=(1, 3))
+    blocked = weight.reshape(blocks, size).sum(axis=1)
+    return summed / (blocked[:, None] * blocked) ** 2
+
+
+def paths_z_rms(
+    profile: NDArray[np.float64],
+    rho: NDArray[np.float64],
+    standard_error: NDArray[np.float64],
+    *,
+    albedo: float,
+    roughness: float,
+) -> float:
+    """RMS z-score of a table against new paths from 16 incidences, in 16 blocks of exits each.
+
+    The paths' seed is not one that a table is made with.
+    """
+    bins = len(rho)
+    chosen = np.unique(np.linspace(0, bins - 1, _INCIDENCES).round().astype(np.int64))
+    counts = shoot(
+        profile,
+        bins=bins,
+        rays=_PATHS,
+        paths_per_ray=1,
+        albedo=albedo,
+        roughness=roughness,
+        seed=987_654_321,
+        incidence=chosen,
+    )
+    blocks = min(BLOCKS, bins // 2)
+    weight = bin_weights(bins)[:, None] / np.pi
+    shape = (blocks, bins // blocks, len(chosen))
+    expected = (rho * weight)[:, chosen].reshape(shape).sum(axis=1)
+    own = ((standard_error * weight)[:, chosen] ** 2).reshape(shape).sum(axis=1)
+    seen = counts.leaving.sum(axis=1)[chosen].T.reshape(shape).sum(axis=1) / _PATHS
+    likely = np.maximum(expected, 1.0 / _PATHS)
+    z = (seen - expected) / np.sqrt(likely * np.maximum(1 - likely, 1e-3) / _PATHS + own)
+    return float(np.sqrt(np.mean(z**2)))
+
+
+def sampler_p_value(lobe: Lobe, samples: int = 40_000) -> float:
+    """p-value of a chi-square test: sampled lights in cells of (phi, lean) against the density.
+
+    For a few views and places across the opening; the least p-value times their number.
+    """
+    from scipy.stats import chi2
+
+    views = ((0.0, 0.0), (0.4, 0.9), (-0.7, -0.5))
+    columns, rows = min(16, lobe.rho.shape[1] // 2), 12
+    least, tested = 1.0, 0
+    for number, (lean, angle) in enumerate(views):
+        o = np.array([np.sin(lean), np.cos(lean) * np.sin(angle), np.cos(lean) * np.cos(angle)])
+        for place in (1, len(lobe.rho) // 2):
+            u = np.random.default_rng(number).random((samples, 3))
+            found = np.zeros((rows, columns))
+            _count(lobe, place, o, u, found)
+            expected = samples * _expected(lobe, place, o, rows, columns)
+            order = np.argsort(expected.ravel())
+            # Cells with few expected are joined until there are enough in each.
+            groups = np.cumsum(expected.ravel()[order]) // 8
+            seen = np.bincount(groups.astype(np.int64), found.ravel()[order])
+            hoped = np.bincount(groups.astype(np.int64), expected.ravel()[order])
+            used = hoped > 4
+            statistic = float(((seen - hoped)[used] ** 2 / hoped[used]).sum())
+            least = min(least, float(chi2.sf(statistic, max(int(used.sum()) - 1, 1))))
+            tested += 1
+    return min(1.0, least * tested)
+
+
+def brightest_excess(
+    picture: NDArray[np.floating], error: NDArray[np.floating], block: int = 8
+) -> float:
+    """How far the brightest block x block pixels of a picture (H, W) lie above 1, in their standard
+    errors (but at least in thousandths of radiance)."""
+    height, width = (side - side % block for side in picture.shape)
+    shape = (height // block, block, width // block, block)
+    mean = picture[:height, :width].reshape(shape).mean(axis=(1, 3), dtype=np.float64)
+    variance = (error[:height, :width].astype(np.float64) ** 2).reshape(shape).sum(axis=(1, 3))
+    return float(((mean - 1) / np.maximum(np.sqrt(variance) / block**2, 1e-3)).max())
+
+
+@njit(cache=True)
+def _count(lobe, place, o, u, found):  # type: ignore[no-untyped-def]
+    rows, columns = found.shape
+    for i in range(len(u)):
+        a, v, n = sampling.sample(
+            lobe.cdf, lobe.sines, lobe.blur, place, o[0], o[1], o[2], u[i, 0], u[i, 1], u[i, 2]
+        )
+        row = min(int(sampling.quantile(a) * rows), rows - 1)
+        found[row, sampling.bin_of(v, n, columns)] += 1.0
+
+
+@njit(cache=True)
+def _expected(lobe, place, o, rows, columns):  # type: ignore[no-untyped-def]
+    """Integral of the density over cells of equal quantile and equal phi, by the midpoints of
+    narrow strips: the measure of a direction is dphi cos theta dtheta."""
+    part = np.zeros((rows, columns))
+    bins = lobe.rho.shape[1]
+    fine, steps = 64, 8
+    for row in range(rows):
+        for strip in range(fine):
+            along = sampling.lean_sine((row + (strip + 0.5) / fine) / rows)
+            rest2 = 1.0 - along * along
+            for column in range(bins):
+                low, high = lobe.sines[column], lobe.sines[column + 1]
+                for step in range(steps):
+                    # Middles in the sine of phi: cos theta dtheta = d(quantile) pi / (2 cos theta)
+                    sine = low + (step + 0.5) / steps * (high - low)
+                    cosine = np.sqrt(max(1.0 - sine * sine, 1e-18))
+                    rest = np.sqrt(rest2)
+                    density = sampling.pdf(
+                        lobe.rho, lobe.share, lobe.blur, place, o[0], o[1], o[2],
+                        along, rest * sine, rest * cosine,
+                    )  # fmt: skip
+                    size = (high - low) / steps / cosine * np.pi / (2.0 * rest * rows * fine)
+                    part[row, column * columns // bins] += density * size
+    return part
