@@ -53,8 +53,8 @@ def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settin
         check_bins(walls.bins)
         if walls.method == "exact" and walls.roughness != 1.0:
             raise ValueError(
-                f"roughness is {walls.roughness:g} with the method exact; expected 1, or the method "
-                "paths."
+                f"roughness is {walls.roughness:g} with the method exact; expected 1, or the "
+                "method paths."
             )
     scattered = settings.get("scratch_layers")
     if isinstance(scattered, LayerSettings):

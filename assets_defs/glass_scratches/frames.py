@@ -121,7 +121,7 @@ class FrameSettings(Settings):
         0.0,
         ge=-360.0,
         le=360.0,
-        description="Turn of the environment about the upward axis, degrees",
+        description="Turn of the environment about up, degrees",
     )
     tile: float = Field(
         1.0, gt=0.0, le=1000.0, description="Side of a tile of scratches; the object's radius is 1"

@@ -30,12 +30,8 @@ _STAGE_SIZE = 256
 class LayerSettings(Settings):
     """The scratches of a tile, the square that repeats over the object."""
 
-    length: float = Field(
-        0.3, gt=0.0, le=1.0, description="Length of a noise cell, tiles (table 1)"
-    )
-    width: float = Field(
-        0.001, gt=0.0, le=1.0, description="Width of a noise cell, tiles (table 1)"
-    )
+    length: float = Field(0.3, gt=0.0, le=1.0, description="Length of a cell, tiles (table 1)")
+    width: float = Field(0.001, gt=0.0, le=1.0, description="Width of a cell, tiles (table 1)")
     threshold: float = Field(
         0.1, gt=0.0, le=0.5, description="Cell noise below this is scratch; more is more scratches"
     )
@@ -43,9 +39,7 @@ class LayerSettings(Settings):
         None, gt=0.0, le=0.6, description="Share of the area that each layer covers; overrides it"
     )
     layers: int = Field(4, ge=1, le=8, description="Layers, each with its own direction")
-    curvature: float = Field(
-        0.0, ge=0.0, le=1.5, description="Turn from end to end, radians (sigma)"
-    )
+    curvature: float = Field(0.0, ge=0.0, le=1.5, description="Turn from end to end, radians")
     digs: float = Field(0.0, ge=0.0, le=1.0, description="Share of the scratches that are pits")
     fading: float = Field(0.0, ge=0.0, le=1.0, description="How far scratches fade along them")
     breaks: float = Field(0.0, ge=0.0, lt=1.0, description="Share of their length that is missing")

@@ -169,7 +169,7 @@ def _across_error(checked: Checked) -> float:
     dataset = checked.dataset
     mean = dataset["across"].values.mean(axis=0, dtype="float64")
     rho = dataset["rho"].values
-    return float(abs(mean - rho).max() / rho.max())
+    return float(abs(mean - rho.T).max() / rho.max())
 
 
 @SCRATCHES.asset(
@@ -199,7 +199,7 @@ def _across_error(checked: Checked) -> float:
         ),
         Check(
             "across_error",
-            "Largest difference of rho from its mean across the opening, over the largest rho.",
+            "Largest difference of the mean across the opening from rho(i, o), over the largest rho.",
             _across_error,
             at_most=1e-5,
         ),

@@ -12,6 +12,7 @@ The interior is on the left of the profile as it runs from the left to the right
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numba
@@ -48,7 +49,7 @@ def facet_ends(profile: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
     corners = [0, *(np.flatnonzero(turns > _CORNER) + 1), len(steps)]
     ends = [profile[:1]]
-    for first, last in zip(corners[:-1], corners[1:], strict=True):
+    for first, last in itertools.pairwise(corners):
         reached = np.concatenate([[0.0], np.cumsum(lengths[first:last])])
         share = max(1.0, count * reached[-1] / lengths.sum())
         angles = np.arccos(1 - 2 * np.clip(reached / reached[-1], 0.0, 1.0)) / np.pi

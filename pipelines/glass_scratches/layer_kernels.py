@@ -27,7 +27,7 @@ X, Y, COSINE, SINE, HALF_LENGTH, HALF_WIDTH, CURVATURE, STRENGTH = range(8)
 KNOTS = 7.0
 """Knots of the noise along a scratch, end to end: gaps of about a seventh of it and more."""
 
-_TIP = 0.25
+_TIP = 0.5
 """Part of the noise's range over which a scratch narrows to a tip before a gap."""
 
 _WAVER = 0.6
@@ -86,10 +86,7 @@ def noise_along(seed: int, place: float) -> float:
     mixed = (1.0 - w) * _hashed(seed, int(knot)) + w * _hashed(seed, int(knot) + 1)
     less, more = min(w, 1.0 - w), max(w, 1.0 - w)
     low = min(mixed, 1.0 - mixed)
-    if low < less:
-        below = 0.5 * low * low / (less * more)
-    else:
-        below = (low - 0.5 * less) / more
+    below = 0.5 * low * low / (less * more) if low < less else (low - 0.5 * less) / more
     return below if mixed <= 0.5 else 1.0 - below
 
 
@@ -113,6 +110,12 @@ def _along_arc(px: float, py: float, curvature: float) -> float:
     if curvature == 0.0:
         return px
     return math.atan2(curvature * px, 1.0 - curvature * py) / curvature
+
+
+@njit(cache=True, error_model="numpy")
+def arc_coordinates(px: float, py: float, curvature: float) -> tuple[float, float]:
+    """Find u, v of a point at (px, py) in the frame of the feature's middle (1 / tile)."""
+    return _along_arc(px, py, curvature), _across_arc(px, py, curvature)
 
 
 @njit(cache=True, inline="always")
@@ -147,7 +150,7 @@ def _state_along(
         if left <= 0.0:
             return 0.0, 0.0
         if left < 1.0:
-            wide = math.sqrt(left * (2.0 - left))
+            wide = left * (2.0 - left)
     if fading > 0.0:
         # Strong where it was begun, gone where the tool left the surface: one end or the other.
         way = 0.5 + 0.5 * (s if seed & 1 else -s)

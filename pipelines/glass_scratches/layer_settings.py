@@ -23,8 +23,8 @@ class LayerSpec:
     digs: share of the features that are pits: round, and of no direction.
     fading: how far a scratch wavers and peters out along its length, 0 not at all, 1 to nothing.
     breaks: share of its length that is missing.
-    spread: sigma of the log-normal factors (of mean 1) on lengths and widths; strengths fall below
-        1 by as much.
+    spread: sigma of the log-normal factors on lengths and widths (the mean area stays); strengths
+        fall below 1 by as much.
     """
 
     length: float = 0.3

@@ -52,6 +52,9 @@ _LONGEST_ARC, _WIDEST_ARC = 0.45, 0.2
 _DIG_SIZE = 0.4
 """Radius of a pit over that of a circle with a scratch's area."""
 
+_ALIKE = 0.6
+"""Correlation of a scratch's width with its length."""
+
 _MOST_CELLS = 1024
 _POINTS = 250_000
 """Of which the coverage of a layer is measured: to about 0.1 % of itself."""
@@ -206,8 +209,10 @@ def _draw_layer(spec: LayerSpec, rng: np.random.Generator) -> _Draw:
     turn = bend * (rng.random(count) - 0.5)
     turn = np.where(is_dig, rng.uniform(0.0, np.pi, count), turn)
     sigma = spec.spread
+    # Long scratches are wide, and none is a short thick stroke. The mean area stays what it was.
+    wide = _ALIKE * long + math.sqrt(1.0 - _ALIKE**2) * wide
     length = spec.length * np.exp(sigma * long - sigma**2 / 2)
-    width = spec.width * np.exp(sigma * wide - sigma**2 / 2)
+    width = spec.width * np.exp(sigma * wide - sigma**2 * (0.5 + _ALIKE))
     round_ = _DIG_SIZE * math.sqrt(spec.length * spec.width) * np.exp(sigma * long - sigma**2)
     return _Draw(
         centre=centre,

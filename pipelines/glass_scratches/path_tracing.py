@@ -1,12 +1,12 @@
-"""Scratched glass by path tracing (section 3.3): Embree for the rays, compiled kernels for the rest.
+"""Scratched glass by path tracing (section 3.3): rays by Embree, compiled kernels for the rest.
 
 Glass is smooth where there is no scratch: a path is reflected or refracted by Fresnel's equations,
 total reflection included. Where there is one, its table answers. What it reflects, F, is shared out
 by the table (Eq. 5), with samples of the table and of the environment combined (multiple importance
 sampling, balance heuristic). What it lets through, 1 - F, goes on into the glass evenly in all
 directions: rough walls scatter it. From inside the same walls let out (1 - mean F) / n² (that is
-what makes it reciprocal) and scatter the rest back. So a scratched solid in a uniform environment is
-as bright as that, and never brighter.
+what makes it reciprocal) and scatter the rest back. So a scratched solid in a uniform environment
+is as bright as that, and never brighter.
 
 Radiance is kept divided by the square of the index around it, which is the same everywhere along an
 unscattered path.
@@ -20,6 +20,7 @@ chance that there is a scratch.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -61,9 +62,9 @@ _SCATTERED_ANGLE = 0.3
 class Surface(NamedTuple):
     """What lies on a glass solid, as the kernels take it.
 
-    ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from its
-    ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile; ``lobe`` of the
-    walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards pi / 2; ``index``
+    ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from
+    its ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile;
+    ``lobe`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards pi / 2; ``index``
     of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
     """
 
@@ -341,7 +342,7 @@ def _in_threads(count: int, *arguments: Any) -> None:
     with ThreadPoolExecutor(workers) as threads:
         parts = [
             threads.submit(_advance, first, last, *arguments)
-            for first, last in zip(borders[:-1], borders[1:], strict=True)
+            for first, last in itertools.pairwise(borders)
         ]
         for part in parts:
             part.result()

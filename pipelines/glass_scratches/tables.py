@@ -31,7 +31,8 @@ class Table2D(NamedTuple):
 
     ``rho`` (M, M) float64; ``standard_error`` (M, M) float64, 0 for the exact one; ``absorbed``
     (M,) float64, part of each bin's beam that stays; ``across`` (places, M, M) float32: rho by the
-    place at which the view's ray enters the opening, from its left end; its mean is rho.
+    place at which the view's ray enters the opening, from its left end, rows being the view: its
+    mean is rho transposed, which is rho but for the paths' noise.
     """
 
     rho: NDArray[np.float64]
@@ -62,7 +63,8 @@ def scratch_table(
     if method == "exact":
         if roughness != 1.0:
             raise ValueError(
-                f"roughness is {roughness:g} with the method exact; expected 1, or the method paths."
+                f"roughness is {roughness:g} with the method exact; expected 1, or the method "
+                "paths."
             )
         lit = exchange(profile, bins, facets)
         solved = solve(lit, albedo)
