@@ -32,11 +32,13 @@ class PathCounts(NamedTuple):
 
     ``leaving`` (M in, places, M out): paths by the part of the opening that they entered through
     and the bin that they left into; ``squares`` (M in, M out): sum over the rays of the square of
-    their number of paths into the bin; ``rays``, ``paths_per_ray``: how many were shot a bin.
+    their number of paths into the bin; ``kept`` (M in,): paths that the walls kept; ``rays``,
+    ``paths_per_ray``: how many were shot a bin.
     """
 
     leaving: NDArray[np.int64]
     squares: NDArray[np.int64]
+    kept: NDArray[np.int64]
     rays: int
     paths_per_ray: int
 
@@ -75,10 +77,12 @@ def shoot(
     chosen = np.arange(bins) if incidence is None else incidence
     leaving = np.zeros((bins, PLACES, bins), np.int64)
     squares = np.zeros((bins, bins), np.int64)
+    kept = np.zeros(bins, np.int64)
+    sines = np.sin(edges)
     _shoot(
-        profile, np.sin(edges), chosen, rays, paths_per_ray, albedo, blur, seed, leaving, squares
+        profile, sines, chosen, rays, paths_per_ray, albedo, blur, seed, leaving, squares, kept
     )
-    return PathCounts(leaving, squares, rays, paths_per_ray)
+    return PathCounts(leaving, squares, kept, rays, paths_per_ray)
 
 
 class PathTable(NamedTuple):
@@ -97,7 +101,7 @@ def table(counts: PathCounts) -> PathTable:
     Places are those where the *view's* ray enters: by reciprocity the counts of paths that start
     there and leave towards the light.
     """
-    leaving, squares, rays, each = counts
+    leaving, squares, kept, rays, each = counts
     paths = rays * each
     bins = len(leaving)
     weight = bin_weights(bins)
@@ -109,7 +113,7 @@ def table(counts: PathCounts) -> PathTable:
         (mean * np.pi / weight).T.copy(),
         (np.sqrt(spread) * np.pi / weight).T.copy(),
         across.transpose(1, 0, 2).copy(),
-        1.0 - mean.sum(axis=1),
+        kept / paths,
     )
 
 
@@ -135,7 +139,7 @@ def _folded(sine):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, parallel=True)
 def _shoot(  # type: ignore[no-untyped-def]
-    profile, sines, chosen, rays, paths, albedo, blur, seed, leaving, squares
+    profile, sines, chosen, rays, paths, albedo, blur, seed, leaving, squares, kept
 ):
     pieces = len(profile) - 1
     bins = len(sines) - 1
@@ -173,6 +177,7 @@ def _shoot(  # type: ignore[no-untyped-def]
                 for _bounce in range(_BOUNCES):
                     state, u = _next(state)
                     if u >= albedo:
+                        kept[bin_in] += 1
                         break
                     state, u = _next(state)
                     if lambert:

@@ -64,8 +64,8 @@ class Surface(NamedTuple):
 
     ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from
     its ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile;
-    ``lobe`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards pi / 2; ``index``
-    of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
+    ``lobe`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards
+    pi / 2; ``index`` of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
     """
 
     layers: LayerArrays
