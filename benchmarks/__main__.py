@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-NAMES = ("btf", "fur")
+NAMES = ("btf", "fur", "scratches")
 SCALES = ("default", "paper")
 
 

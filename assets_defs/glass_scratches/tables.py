@@ -199,7 +199,7 @@ def _across_error(checked: Checked) -> float:
         ),
         Check(
             "across_error",
-            "Largest difference of the mean across the opening from rho(i, o), over the largest rho.",
+            "Largest difference of the mean across the opening from rho(i, o), over the largest.",
             _across_error,
             at_most=1e-5,
         ),

@@ -371,7 +371,7 @@ def _visible_area(arrays: LayerArrays, layer: int, i: int, points: int) -> float
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def visible_areas(arrays: LayerArrays, layer: int, points: int, out: NDArray[np.float64]) -> None:
-    """Fill out (n,) with the area, times opacity, in which each feature of the layer is the nearest.
+    """Fill out (n,) with the area, times opacity, in which each of the layer's features is nearest.
 
     Their sum is the layer's coverage. Points in the features themselves tell it far better than
     points in the tile, most of which meet no scratch.

@@ -79,9 +79,7 @@ def shoot(
     squares = np.zeros((bins, bins), np.int64)
     kept = np.zeros(bins, np.int64)
     sines = np.sin(edges)
-    _shoot(
-        profile, sines, chosen, rays, paths_per_ray, albedo, blur, seed, leaving, squares, kept
-    )
+    _shoot(profile, sines, chosen, rays, paths_per_ray, albedo, blur, seed, leaving, squares, kept)
     return PathCounts(leaving, squares, kept, rays, paths_per_ray)
 
 

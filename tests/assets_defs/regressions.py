@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import dagster as dg
 import pytest
 
 from assets_defs.launcher import LaunchError, Request
@@ -56,3 +57,57 @@ def assert_found(
     # What lies before the failed asset passed its own checks, wrong as it was: make it again.
     force = any(store.current(slot) != pointer.version for slot, pointer in before.items())
     house.launcher.launch(Request(system, [regression.keys], force=force))
+
+
+def materialise(
+    house: Any, system: System, asset: str, keys: Mapping[str, str], **given: Any
+) -> dg.ExecuteInProcessResult:
+    """One asset's step and its checks, as the web UI's Materialize button runs them."""
+    by = system.plans[asset].by
+    return (
+        house.definitions.get_repository_def()
+        .get_job(system.job_name(by))
+        .execute_in_process(
+            run_config={
+                "ops": {f"{system.name}__{asset}": {"config": given}},
+                "loggers": {"console": {"config": {"log_level": "CRITICAL"}}},
+            },
+            instance=house.instance,
+            partition_key="|".join(keys[name] for name in sorted(by)),
+            raise_on_error=False,
+            asset_selection=[dg.AssetKey([system.name, asset])],
+        )
+    )
+
+
+def assert_check_finds(
+    house: Any, system: System, regression: Regression, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plant the bug and run the one asset that has the check: what it is made from stays right.
+
+    Its check must fail with its own words, and nothing current may change.
+    """
+    store = house.workspace.store
+    plan = next(
+        plan
+        for plan in system.plans.values()
+        if regression.check in {check.name for check in plan.checks}
+    )
+    slot = system.slot(plan.name, {name: regression.keys[name] for name in plan.by})
+    before = {slot: store.pointer(slot) for slot in store.slots()}
+    versions = set(store.versions(slot))
+    right = getattr(regression.home, regression.name)
+    monkeypatch.setattr(
+        regression.home,
+        regression.name,
+        lambda *arguments, **options: regression.wrong(right, *arguments, **options),
+    )
+    done = materialise(house, system, plan.name, regression.keys)
+    monkeypatch.undo()
+    assert not done.success
+    (rejected,) = set(store.versions(slot)) - versions
+    verdict = store.verdicts(slot, rejected)[regression.check]
+    assert not verdict["passed"]
+    assert regression.check in verdict["reason"]
+    assert {slot: store.pointer(slot) for slot in store.slots()} == before
+    store.open(slot).load()

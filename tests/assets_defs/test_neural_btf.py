@@ -24,7 +24,7 @@ from pipelines.neural_btf import (
     representatives,
     training,
 )
-from tests.assets_defs.regressions import Regression
+from tests.assets_defs.regressions import Regression, assert_check_finds, materialise
 from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
 
 MATERIAL = {"material": "knit"}
@@ -42,22 +42,7 @@ def good(house: Any) -> Any:
 def _materialise(
     house: Any, asset: str, keys: Mapping[str, str], **given: Any
 ) -> dg.ExecuteInProcessResult:
-    """One asset's step and its checks, as the web UI's Materialize button runs them."""
-    by = BTF.plans[asset].by
-    return (
-        house.definitions.get_repository_def()
-        .get_job(BTF.job_name(by))
-        .execute_in_process(
-            run_config={
-                "ops": {f"{BTF.name}__{asset}": {"config": given}},
-                "loggers": {"console": {"config": {"log_level": "CRITICAL"}}},
-            },
-            instance=house.instance,
-            partition_key="|".join(keys[name] for name in sorted(by)),
-            raise_on_error=False,
-            asset_selection=[dg.AssetKey([BTF.name, asset])],
-        )
-    )
+    return materialise(house, BTF, asset, keys, **given)
 
 
 def _tries_again(house: Any) -> int:
@@ -287,31 +272,7 @@ def test_every_check_has_a_planted_regression() -> None:
 def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
     good: Any, regression: Regression, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only the asset that has the check is run: what it is made from is right and current."""
-    store = good.workspace.store
-    plan = next(
-        plan
-        for plan in BTF.plans.values()
-        if regression.check in {check.name for check in plan.checks}
-    )
-    slot = BTF.slot(plan.name, {name: regression.keys[name] for name in plan.by})
-    before = _pointers(good)
-    versions = set(store.versions(slot))
-    right = getattr(regression.home, regression.name)
-    monkeypatch.setattr(
-        regression.home,
-        regression.name,
-        lambda *arguments, **options: regression.wrong(right, *arguments, **options),
-    )
-    done = _materialise(good, plan.name, regression.keys)
-    monkeypatch.undo()
-    assert not done.success
-    (rejected,) = set(store.versions(slot)) - versions
-    verdict = store.verdicts(slot, rejected)[regression.check]
-    assert not verdict["passed"]
-    assert regression.check in verdict["reason"]
-    assert _pointers(good) == before
-    store.open(slot).load()
+    assert_check_finds(good, BTF, regression, monkeypatch)
 
 
 def test_a_failing_check_ends_the_launch_with_its_sentence(

@@ -1,0 +1,335 @@
+"""The scratch graph at its smallest, planted regressions, users' files, bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from assets_defs.glass_scratches import SCRATCHES
+from assets_defs.launcher import Request
+from assets_defs.system import Source
+from pipelines import colour, solids
+from pipelines.glass_scratches import frames, layers, profiles, sampling, tables
+from pipelines.glass_scratches.exact_table import equation_1, leaving_share
+from tests.assets_defs.regressions import Regression, assert_check_finds
+
+SETTING = {"setting": "setting-2"}
+PLATE = {"object": "plate"}
+KEYS = SETTING | PLATE
+TINY = {"size": 32, "samples": 2, "lights": 1, "moving_size": 32}
+
+
+@pytest.fixture(scope="module")
+def good(house: Any) -> Any:
+    """The house with a diffuse and a mirror-like setting made once."""
+    house.launcher.launch(Request(SCRATCHES, [KEYS, {"setting": "mirror"}], preset="test"))
+    return house
+
+
+def _open(house: Any, asset: str, keys: dict[str, str]) -> Any:
+    return house.workspace.store.open(SCRATCHES.slot(asset, keys))
+
+
+def test_every_asset_is_current_and_has_passed_every_check(good: Any) -> None:
+    store = good.workspace.store
+    for plan in SCRATCHES.plans.values():
+        slot = SCRATCHES.slot(plan.name, {name: KEYS[name] for name in plan.by})
+        verdicts = store.verdicts(slot, store.current(slot))
+        assert set(verdicts) == {check.name for check in plan.checks}
+        assert all(verdict["passed"] for verdict in verdicts.values())
+
+
+def test_the_table_is_the_papers_up_to_its_normalisation(good: Any) -> None:
+    """Eq. 1 counts rays: M / (N cos phi_o) each. All N that enter leave again."""
+    rho = _open(good, "scratch_table_2d", SETTING)["rho"].values
+    bins = len(rho)
+    centres = (np.arange(bins) + 0.5) * np.pi / bins - np.pi / 2
+    counted = equation_1(rho) * np.cos(centres)[:, None] / bins
+    assert np.allclose(counted.sum(axis=0), 1.0, atol=1e-10)
+
+
+def test_leans_are_those_of_the_paper(good: Any) -> None:
+    table = _open(good, "scratch_table", SETTING)
+    rho = _open(good, "scratch_table_2d", SETTING)["rho"].values
+    assert np.allclose(table["rho_s"].values[2], rho, rtol=1e-6)  # F(pi / 2) = 1
+    assert np.allclose(table["rho_s"].values[0], 0.04 * rho, rtol=1e-6)
+    assert np.allclose(table["gamma"].values, np.log(1 / 32) / np.log(2 / 3))
+
+
+def test_mirrors_lose_nothing_either(good: Any) -> None:
+    table = _open(good, "scratch_table_2d", {"setting": "mirror"})
+    assert table.attrs["method"] == "paths"
+    assert np.allclose(leaving_share(table["rho"].values), 1.0)
+    assert (table["standard_error"].values > 0).any()
+
+
+def test_frames_show_scratches_and_stay_below_a_uniform_environment(good: Any) -> None:
+    shown = _open(good, "glass_frames", KEYS)
+    assert 0.02 < shown["scratched"].values[1].mean() < 0.9
+    assert abs(shown["furnace"].values.mean() - 1) < 0.02
+    assert shown["moving"].shape == (2, 48, 48, 3)
+
+
+def test_the_overview_lays_settings_side_by_side(good: Any) -> None:
+    store = good.workspace.store
+    good.launcher.launch(Request(SCRATCHES, [{"setting": "mirror"} | PLATE], "test", TINY))
+    good.launcher.launch(Request(SCRATCHES, [KEYS], "test", TINY))
+    assert SCRATCHES.overview is not None
+    pictures = SCRATCHES.overview(store, list(store.slots()))
+    assert set(pictures) == {
+        "plate-far",
+        "plate-close",
+        "plate-diffuse-beside-specular",
+        "plate-moving-light",
+    }
+    assert pictures["plate-far"].shape == (32, 64, 3)
+    good.launcher.launch(Request(SCRATCHES, [KEYS], "test"))
+
+
+# ---- users' files ----------------------------------------------------------------------------
+
+
+def test_a_profile_a_mesh_and_an_environment_of_the_users(make_house: Any, tmp_path: Path) -> None:
+    house = make_house()
+    inbox = house.workspace.inbox("glass_scratches")
+    inbox.mkdir(parents=True)
+    profile = inbox / "diamond.csv"
+    profile.write_text("v,n\n-6,0\n-4,1\n-1,-3\n0,-3.5\n2,-2\n4,1.5\n7,0\n")
+    mesh = inbox / "block.obj"
+    solid = solids.plate(1.0, 1.0, 0.6)
+    mesh.write_text(
+        "".join(f"v {x} {y} {z}\n" for x, y, z in solid.vertices)
+        + "".join(f"f {a} {b} {c}\n" for a, b, c in solid.triangles + 1)
+    )
+    sky = tmp_path / "sky.hdr"
+    light = np.full((16, 32, 3), 0.1, np.float32)
+    light[4, 20] = 40.0
+    assert cv2.imwrite(str(sky), light)
+    keys = {"setting": Source.of(profile).key, "object": Source.of(mesh).key}
+    request = Request(SCRATCHES, [keys], "test", TINY | {"environment": str(sky)})
+    made = house.launcher.launch(request)
+    assert {outcome.state for outcome in made} == {"made"}
+    points = _open(house, "scratch_profile", {"setting": keys["setting"]})["points"].values
+    assert points[:, 1].max() == 0.0
+    assert np.isclose(points[:, 1].min(), -4.5)  # from the lower crest
+    # The same file is current; another one under its name is not.
+    assert {outcome.state for outcome in house.launcher.launch(request)} == {"current"}
+    assert cv2.imwrite(str(sky), light * 2)
+    again = house.launcher.launch(request)
+    assert [o.slot.asset for o in again if o.state == "made"] == ["glass_frames"]
+
+
+# ---- planted regressions ---------------------------------------------------------------------
+
+
+def _deeper(right: Callable[..., Any], *arguments: Any) -> Any:
+    return right(*arguments) * [1.0, 1.1]
+
+
+def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
+    return right(*arguments) + np.array([0.0, 0.1])
+
+
+def _brighter_table(right: Callable[..., Any], *arguments: Any) -> Any:
+    solved = right(*arguments)
+    return solved._replace(rho=solved.rho * 1.001)
+
+
+def _one_sided(right: Callable[..., Any], *arguments: Any) -> Any:
+    solved = right(*arguments)
+    return solved._replace(rho=solved.rho * np.linspace(0.99, 1.01, len(solved.rho)))
+
+
+def _other_profile(right: Callable[..., Any], profile: Any, *arguments: Any) -> Any:
+    return right(profile * [1.0, 1.6], *arguments)
+
+
+def _skewed_sampler(right: Callable[..., Any], *arguments: Any) -> Any:
+    lobe = right(*arguments)
+    return lobe._replace(cdf=(lobe.cdf.astype(np.float64) ** 1.1).astype(np.float32))
+
+
+def _generous_sampler(right: Callable[..., Any], *arguments: Any) -> Any:
+    lobe = right(*arguments)
+    return lobe._replace(share=(lobe.share * np.float32(1.02)).astype(np.float32))
+
+
+def _other_exponent(right: Callable[..., Any], *arguments: Any) -> Any:
+    lean = right(*arguments)
+    return lean._replace(gamma=lean.gamma * 0.8)
+
+
+def _wide_scratches(right: Callable[..., Any], *arguments: Any) -> Any:
+    made = right(*arguments)
+    fields = made._asdict() | {"half_width": made.half_width * np.float32(2.0)}
+    kept = {name: fields[name] for name in made._fields[:10]}
+    return layers.join_features(**kept)
+
+
+def _moved_map(right: Callable[..., Any], *arguments: Any) -> Any:
+    return np.roll(right(*arguments), 40, axis=2)
+
+
+def _holed(right: Callable[..., Any], *arguments: Any) -> Any:
+    solid = right(*arguments)
+    return solid._replace(triangles=solid.triangles[:-1], corner_normals=solid.corner_normals[:-1])
+
+
+def _smaller(right: Callable[..., Any], *arguments: Any) -> Any:
+    solid = right(*arguments)
+    return solid._replace(vertices=solid.vertices * 0.8)
+
+
+def _negative_pixel(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    picture = right(*arguments, **options)
+    picture.radiance[0, 0] = -1.0
+    return picture
+
+
+def _unscratched(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    picture = right(*arguments, **options)
+    return picture._replace(scratched=picture.scratched * 0)
+
+
+def _furnace_times(factor: float) -> Callable[..., Any]:
+    def wrong(right: Callable[..., Any], *arguments: Any) -> Any:
+        picture = right(*arguments)
+        return picture._replace(radiance=picture.radiance * np.float32(factor))
+
+    return wrong
+
+
+REGRESSIONS = (
+    Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
+    Regression("opening_tilt", profiles, "cut_profile", _raised, SETTING),
+    Regression("furnace_error", tables, "solve", _brighter_table, SETTING),
+    Regression("reciprocity_error", tables, "solve", _one_sided, SETTING),
+    Regression("paths_z_rms", tables, "exchange", _other_profile, SETTING),
+    Regression(
+        "across_error",
+        tables,
+        "_across",
+        lambda right, *arguments: right(*arguments) * np.float32(1.001),
+        SETTING,
+    ),
+    Regression("sampler_p", sampling, "make_lobe", _skewed_sampler, SETTING),
+    Regression("interpolation_error", tables, "lean_factors", _other_exponent, SETTING),
+    Regression("largest_share", sampling, "make_lobe", _generous_sampler, SETTING),
+    Regression("coverage_error", layers, "make_layers", _wide_scratches, SETTING),
+    Regression("map_error", layers, "coverage_maps", _moved_map, SETTING),
+    Regression("edge_error", solids, "plate", _holed, PLATE),
+    Regression("volume", solids, "plate", _smaller, PLATE),
+    Regression("not_finite", frames, "trace", _negative_pixel, KEYS),
+    Regression("furnace_excess", frames, "furnace", _furnace_times(1.1), KEYS),
+    Regression("furnace_loss", frames, "furnace", _furnace_times(0.9), KEYS),
+    Regression("scratched_share", frames, "trace", _unscratched, KEYS),
+    Regression(
+        "mean_brightness",
+        colour,
+        "to_8bit",
+        lambda right, picture: right(np.asarray(picture) * 0.5),
+        KEYS,
+    ),
+    Regression(
+        "stage_brightness",
+        frames,
+        "draw",
+        lambda right, *arguments, **options: right(*arguments, **options) * np.float32(0.05),
+        KEYS,
+    ),
+)
+
+
+def test_every_check_has_a_planted_regression() -> None:
+    names = {check.name for plan in SCRATCHES.plans.values() for check in plan.checks}
+    assert {regression.check for regression in REGRESSIONS} == names
+
+
+@pytest.mark.parametrize("regression", REGRESSIONS, ids=lambda regression: regression.check)
+def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
+    good: Any, regression: Regression, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert_check_finds(good, SCRATCHES, regression, monkeypatch)
+
+
+# ---- bad input -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"albedo": 1.2}, r"'albedo' is 1\.2; input should be less than or equal to 1"),
+        ({"refractive_index": 0.0}, r"'refractive_index' is 0\.0; input should be greater than 0"),
+        ({"bins": 31}, r"'bins' is 31; input should be a multiple of 2"),
+        ({"bins": 6}, r"'bins' is 6; input should be greater than or equal to 8"),
+        ({"width": 0.0}, r"'width' is 0\.0; input should be greater than 0"),
+        ({"profile_width": 0.0}, r"'profile_width' is 0\.0; input should be greater than 0"),
+        ({"threshold": 0.7}, r"'threshold' is 0\.7; input should be less than or equal to 0\.5"),
+        ({"roughness": 0.5, "method": "exact"}, r"roughness is 0\.5 with the method exact"),
+        ({"resolution": 100}, r"resolution is 100; expected a power of two"),
+        ({"shape": "u", "profile_depth": 8.0}, r"depth of the profile is 8; expected at most 5"),
+        ({"environment": "moon"}, r"environment is 'moon'; expected lamps, sky, uniform"),
+        ({"environment": "gone.hdr"}, r"gone\.hdr: .* missing"),
+        ({"length": 0.001, "width": 0.0001}, r"makes 40000000 scratches; expected at most 2000000"),
+    ],
+)
+def test_bad_settings_are_refused_before_any_work(
+    good: Any, given: dict[str, Any], sentence: str
+) -> None:
+    store = good.workspace.store
+    before = {slot: store.pointer(slot) for slot in store.slots()}
+    with pytest.raises(ValueError, match=sentence) as refused:
+        good.launcher.launch(Request(SCRATCHES, [KEYS], given=given))
+    assert len(str(refused.value).splitlines()) == 1
+    assert {slot: store.pointer(slot) for slot in store.slots()} == before
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("loop.csv", "v,n\n-5,0\n3,-4\n-3,-4\n5,0\n", r"loop\.csv: the profile crosses itself"),
+        ("nan.csv", "v,n\n-5,0\n0,nan\n5,0\n", r"nan\.csv: .*nan"),
+        ("hang.csv", "v,n\n0,0\n-3,-2\n2,-4\n5,0\n", r"hang\.csv: the profile runs back under"),
+        (
+            "open.obj",
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n",
+            r"open\.obj: .*open|open\.obj: .*border",
+        ),
+    ],
+)
+def test_bad_files_are_refused_before_any_work(
+    good: Any, name: str, content: str, sentence: str
+) -> None:
+    inbox = good.workspace.inbox("glass_scratches")
+    inbox.mkdir(parents=True, exist_ok=True)
+    (inbox / name).write_text(content)
+    key = Source.of(inbox / name).key
+    keys = KEYS | {"object" if name.endswith("obj") else "setting": key}
+    with pytest.raises(ValueError, match=sentence) as refused:
+        good.launcher.launch(Request(SCRATCHES, [keys], preset="test"))
+    assert len(str(refused.value).splitlines()) == 1
+    (inbox / name).unlink()
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"), [(np.nan, r"sky\.exr: .*nan"), (-1.0, r"sky\.exr: .*-1")]
+)
+def test_an_environment_with_bad_radiance_is_refused(
+    good: Any, tmp_path: Path, value: float, sentence: str
+) -> None:
+    import OpenEXR
+
+    light = np.ones((16, 32, 3), np.float32)
+    light[3, 5, 1] = value
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {"RGB": light}) as file:
+        file.write(str(tmp_path / "sky.exr"))
+    with pytest.raises(ValueError, match=sentence):
+        good.launcher.launch(
+            Request(SCRATCHES, [KEYS], given={"environment": str(tmp_path / "sky.exr")})
+        )
