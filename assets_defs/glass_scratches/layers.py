@@ -151,7 +151,7 @@ def _map_error(checked: Checked) -> float:
             "map_error",
             "RMS difference of the coverage maps from the scratches sampled anew, over their deviation.",
             _map_error,
-            at_most=0.6,
+            at_most=0.9,
         ),
     ),
 )
