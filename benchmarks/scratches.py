@@ -16,7 +16,7 @@ from pipelines.glass_scratches.frames import cameras
 from pipelines.glass_scratches.layers import LayerSpec, coverage_maps, layer_arrays, make_layers
 from pipelines.glass_scratches.monte_carlo import shoot
 from pipelines.glass_scratches.path_tracing import Strategy, Surface, make_surface, trace
-from pipelines.glass_scratches.profiles import built_in_profile
+from pipelines.glass_scratches.profiles import Shape, built_in_profile
 from pipelines.glass_scratches.sampling import make_lobe
 from pipelines.glass_scratches.tables import interpolation_error, lean_factors, scratch_table
 from pipelines.solids import plate
@@ -26,7 +26,7 @@ BINS, RAYS, PATHS = 256, 10_000, 100
 PATHS_A_BIN = 1_000_000
 FACETS = (64, 128, 256, 512)
 REFERENCE_FACETS = 1024
-SHAPES = ("v", "u", "trapezoid", "raised")
+SHAPES: tuple[Shape, ...] = ("v", "u", "trapezoid", "raised")
 SEEDS = 16
 VARIANCE_SIZE, VARIANCE_SAMPLES = 64, 64
 RENDER_SIZE, RENDER_SAMPLES = 512, 64
@@ -135,6 +135,7 @@ def _setting_2() -> Surface:
         coverage_maps(layers, 512),
         make_lobe(table.across, 1.0),
         lean_factors(BINS, 1.5, "paper"),
+        roughness=1.0,
         tile=1.0,
         index=1.5,
     )
@@ -182,9 +183,16 @@ def _rendering() -> dict[str, float]:
     solid, surface = plate(1.5, 1.1, 0.05), _setting_2()
     light = environments.sampler(environments.lamps(512))
     camera = cameras(solid)[0]
-    options = {"width": RENDER_SIZE, "height": RENDER_SIZE}
     started = time.perf_counter()
-    trace(solid, surface, light, camera, samples=RENDER_SAMPLES, **options)
+    trace(
+        solid,
+        surface,
+        light,
+        camera,
+        width=RENDER_SIZE,
+        height=RENDER_SIZE,
+        samples=RENDER_SAMPLES,
+    )
     seconds = time.perf_counter() - started
     return {
         "render_s": seconds,

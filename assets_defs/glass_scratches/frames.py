@@ -299,6 +299,7 @@ def glass_frames(
             scratch_table_2d.attrs["roughness"],
         ),
         lean,
+        roughness=scratch_table_2d.attrs["roughness"],
         tile=settings.tile,
         index=index,
     )

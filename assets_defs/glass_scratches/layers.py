@@ -84,11 +84,16 @@ def layers_of(dataset: xr.Dataset) -> Layers:
     """The scratches of a `scratch_layers` dataset, with their search grid."""
     from pipelines.glass_scratches.layers import join_features
 
-    columns = ("centre", "turn", "half_length", "half_width", "curvature", "strength", "seed")
     return join_features(
         dataset["angle"].values,
         dataset["feature_layer"].values,
-        *(dataset[name].values for name in columns),
+        dataset["centre"].values,
+        dataset["turn"].values,
+        dataset["half_length"].values,
+        dataset["half_width"].values,
+        dataset["curvature"].values,
+        dataset["strength"].values,
+        dataset["seed"].values,
         dataset["is_dig"].values,
         fading=dataset.attrs["fading"],
         breaks=dataset.attrs["breaks"],
@@ -149,7 +154,7 @@ def _map_error(checked: Checked) -> float:
         ),
         Check(
             "map_error",
-            "RMS difference of the coverage maps from the scratches sampled anew, over their deviation.",
+            "RMS difference of the maps from the scratches sampled anew, over the maps' deviation.",
             _map_error,
             at_most=0.9,
         ),

@@ -127,7 +127,7 @@ class TableSettings(Settings):
             "demo": {"bins": 256 if keys["setting"] != "mirror" else 128},
             "paper": {"rays": 10_000, "paths_per_ray": 100},
         }[name]
-        return cls(roughness=0.0 if keys["setting"] == "mirror" else 1.0, **sizes)  # type: ignore[arg-type]
+        return cls(roughness=0.0 if keys["setting"] == "mirror" else 1.0, **sizes)
 
 
 def _table_pictures(dataset: xr.Dataset) -> Pictures:

@@ -81,7 +81,7 @@ def trace_frames(
         draw(actor, light, camera, width=size, height=size, supersampling=2)[..., :3]
         for camera in views
     ]
-    return Frames(*traced, np.stack(stage))
+    return Frames(traced[0], traced[1], np.stack(stage))
 
 
 def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:

@@ -3,10 +3,11 @@
 Glass is smooth where there is no scratch: a path is reflected or refracted by Fresnel's equations,
 total reflection included. Where there is one, its table answers. What it reflects, F, is shared out
 by the table (Eq. 5), with samples of the table and of the environment combined (multiple importance
-sampling, balance heuristic). What it lets through, 1 - F, goes on into the glass evenly in all
-directions: rough walls scatter it. From inside the same walls let out (1 - mean F) / n² (that is
-what makes it reciprocal) and scatter the rest back. So a scratched solid in a uniform environment
-is as bright as that, and never brighter.
+sampling, balance heuristic). What it lets through, 1 - F, goes on into the glass: rough walls
+scatter it evenly in all directions, mirror-like ones bend it as the smooth surface does, and of
+walls in between a share equal to the roughness is scattered. From inside, rough walls let out
+(1 - mean F) / n² (that is what makes it reciprocal) and scatter the rest back. So a scratched solid
+in a uniform environment is as bright as that, and never brighter.
 
 Radiance is kept divided by the square of the index around it, which is the same everywhere along an
 unscattered path.
@@ -64,8 +65,9 @@ class Surface(NamedTuple):
 
     ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from
     its ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile;
-    ``lobe`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the exponent towards
-    pi / 2; ``index`` of the glass; ``mean_factor``: F averaged over the hemisphere by the cosine.
+    ``lobe`` and ``roughness`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the
+    exponent towards pi / 2; ``refraction``: index of the glass; ``mean_factor``: F averaged over
+    the hemisphere by the cosine.
     """
 
     layers: LayerArrays
@@ -74,9 +76,10 @@ class Surface(NamedTuple):
     resolution: int
     tile: float
     lobe: Lobe
+    roughness: float
     head_on: NDArray[np.float64]
     gamma: NDArray[np.float64]
-    index: float
+    refraction: float
     mean_factor: float
 
 
@@ -119,6 +122,7 @@ def make_surface(
     lobe: Lobe,
     lean: Lean,
     *,
+    roughness: float,
     tile: float,
     index: float,
 ) -> Surface:
@@ -138,6 +142,7 @@ def make_surface(
         coverage.shape[1],
         tile,
         lobe,
+        roughness,
         head_on,
         gamma,
         index,
@@ -587,7 +592,7 @@ def _event(  # type: ignore[no-untyped-def]
         starts[i] = position + offset * face
     else:
         goes_on = True
-        _pass(paths, i, normal, face, side, surface.index, u_choice)
+        _pass(paths, i, normal, face, side, surface.refraction, u_choice)
         way = paths.way[i]
     if not goes_on:
         return
@@ -633,6 +638,24 @@ def _cosine_direction(u1, u2):  # type: ignore[no-untyped-def]
 def _even_direction(u1, u2):  # type: ignore[no-untyped-def]
     radius, turn = np.sqrt(max(1.0 - u1 * u1, 0.0)), 2.0 * np.pi * u2
     return radius * np.cos(turn), radius * np.sin(turn), u1
+
+
+@njit(cache=True)
+def _let_out(surface, paths, i, along, across, normal, u):  # type: ignore[no-untyped-def]
+    """At the mirror-like part of a scratch's walls, from inside: out again where the smooth surface
+    would let it out, by 1 - F of the way outside (so it is reciprocal), or back."""
+    way = paths.way[i].copy()
+    up = (way * normal).sum()
+    iu, iv = surface.refraction * (way * along).sum(), surface.refraction * (way * across).sum()
+    outer2 = 1.0 - iu * iu - iv * iv
+    paths.density[i] = 0.0
+    if outer2 > 0.0:
+        i_n = np.sqrt(outer2)
+        if u >= lean_factor(surface, iu, iv, i_n):
+            paths.way[i] = iu * along + iv * across + i_n * normal
+            return True
+    paths.way[i] = way - 2.0 * up * normal
+    return True
 
 
 @njit(cache=True)
@@ -742,6 +765,12 @@ def _scatter(  # type: ignore[no-untyped-def]
     paths.angle[i] = _SCATTERED_ANGLE
     scale = 1.0  # of f cos for the light (iu, iv, in): what comes from outside
 
+    u3 = _unit(_mixed(seed + np.uint64((depth + 1) * samples + number % samples)))
+    u4 = _unit(_mixed(np.uint64(u3 * 9007199254740992.0) + np.uint64(11)))
+    clear = u4 >= surface.roughness
+    if clear and side < 0.0:
+        return _let_out(surface, paths, i, along, across, normal, u_choice)
+
     if side > 0.0:
         factor = lean_factor(surface, ou, ov, on)
         returned = factor * lobe.share[part, bin_of(ov, on, len(surface.gamma))]
@@ -768,7 +797,7 @@ def _scatter(  # type: ignore[no-untyped-def]
                 own = sampling.pdf(lobe.rho, lobe.share, lobe.blur, part, ou, ov, on, iu, iv, i_n)
             else:
                 let_out = 1.0 - lean_factor(surface, iu, iv, i_n)
-                scale = let_out * i_n / (np.pi * surface.index**2)
+                scale = let_out * i_n / (np.pi * surface.refraction**2)
                 own = i_n / np.pi
             gain = scale / (density + out_chance * own)
             if gain > 0.0:
@@ -787,11 +816,9 @@ def _scatter(  # type: ignore[no-untyped-def]
                     lobe.rho, lobe.blur, part, ou, ov, on, iu, iv, i_n
                 )
             else:
-                gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / (np.pi * surface.index**2)
+                gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / (np.pi * surface.refraction**2)
             gain *= 2.0 * np.pi * i_n
         elif side > 0.0:
-            # Its own third number, where the lean is drawn evenly.
-            u3 = _unit(_mixed(seed + np.uint64((depth + 1) * samples + number % samples)))
             iu, iv, i_n = sampling.sample(
                 lobe.cdf, lobe.sines, lobe.blur, part, ou, ov, on, u1, u2, u3
             )
@@ -801,13 +828,22 @@ def _scatter(  # type: ignore[no-untyped-def]
             )
         else:
             iu, iv, i_n = _cosine_direction(u1, u2)
-            gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / surface.index**2
+            gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / surface.refraction**2
             density = out_chance * i_n / np.pi
         gain /= out_chance
         paths.density[i] = density
+    elif clear:  # … or inside, bent as by the smooth surface
+        paths.density[i] = 0.0
+        gain = (1.0 - factor) / (1.0 - out_chance)
+        iu, iv = -ou / surface.refraction, -ov / surface.refraction
+        i_n = -np.sqrt(max(1.0 - iu * iu - iv * iv, 0.0))
     else:  # … or inside, evenly scattered
         paths.density[i] = 0.0
-        gain = 1.0 - factor if side > 0.0 else 1.0 - (1.0 - surface.mean_factor) / surface.index**2
+        gain = (
+            1.0 - factor
+            if side > 0.0
+            else 1.0 - (1.0 - surface.mean_factor) / surface.refraction**2
+        )
         gain /= 1.0 - out_chance
         if uniform:
             iu, iv, i_n = _even_direction(u1, u2)
@@ -816,7 +852,7 @@ def _scatter(  # type: ignore[no-untyped-def]
         else:
             pick = (u_choice - out_chance) / (1.0 - out_chance)
             iu, iv, i_n, density = _inward(
-                environment, flats, along, across, normal, surface.index, pick, u1, u2
+                environment, flats, along, across, normal, surface.refraction, pick, u1, u2
             )
             gain *= -i_n / np.pi / density if density > 0.0 else 0.0
     if gain <= 0.0 or i_n == 0.0:

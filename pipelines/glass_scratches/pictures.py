@@ -46,12 +46,14 @@ def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
     right.set_thetamin(-90)
     right.set_thetamax(90)
     half = max(1, len(rho) // 128)
+    longest = 0.0
     for incidence, colour in zip(_SHOWN_INCIDENCES, ("#b8860b", "#20506a", "#8b2252"), strict=True):
         at = int(np.argmin(np.abs(angles - np.radians(incidence))))
         lobe = rho[:, max(at - half, 0) : at + half + 1].mean(axis=1)
+        longest = max(longest, float(lobe.max()))
         right.plot(angles, lobe, color=colour, label=f"φi = {incidence:g}°")
         right.fill(angles, lobe, color=colour, alpha=0.12)
-    right.set_ylim(0.0, float(np.quantile(rho, 0.995)) * 1.1)
+    right.set_ylim(0.0, 1.1 * longest)
     right.legend(loc="lower center", fontsize=8)
     return drawn(canvas)
 

@@ -56,7 +56,7 @@ class ScratchedActor:
         facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         facing /= np.linalg.norm(facing, axis=1, keepdims=True)
         self._corners = corners.reshape(-1, 3)
-        self._attributes = {
+        self._attributes: dict[str, NDArray[Any]] = {
             "shading": np.asarray(solid.corner_normals).reshape(-1, 3),
             "facing": np.repeat(facing, 3, axis=0),
         }

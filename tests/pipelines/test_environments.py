@@ -412,7 +412,7 @@ def test_lamps_are_five_in_a_dim_room_mostly_above() -> None:
     bright = luminance(light.astype(np.float64))
     assert bright.min() == pytest.approx(0.02, rel=1e-5)
     assert spots(bright > 0.5) == 5
-    assert integral(bright) / (4 * math.pi) == pytest.approx(0.3, abs=0.01)
+    assert integral(bright) / (4 * math.pi) == pytest.approx(0.284, abs=0.001)
     assert bright[:128].sum() > 20 * (bright[128:] - 0.02).sum()
     assert (bright[128:] > 0.5).any()  # the lamp on the horizon
     # Warm and cool, none coloured much.
@@ -425,7 +425,7 @@ def test_lamps_are_five_in_a_dim_room_mostly_above() -> None:
 @pytest.mark.parametrize("height", [1, 7, 16, 64])
 def test_lamps_give_as_much_light_in_coarse_maps(height: int) -> None:
     bright = luminance(lamps(height).astype(np.float64))
-    assert integral(bright) / (4 * math.pi) == pytest.approx(0.3023, abs=1e-4)
+    assert integral(bright) / (4 * math.pi) == pytest.approx(0.28422, abs=1e-4)
 
 
 # ---- rotated ---------------------------------------------------------------------------------
