@@ -126,7 +126,7 @@ class FrameSettings(Settings):
     tile: float = Field(
         1.0, gt=0.0, le=1000.0, description="Side of a tile of scratches; the object's radius is 1"
     )
-    lights: int = Field(8, ge=1, le=720, description="Pictures of the moving light")
+    lights: int = Field(6, ge=1, le=720, description="Pictures of the moving light")
     moving_size: int = Field(160, ge=32, le=2048, description="Their height and width, pixels")
     frame_seed: int = Field(0, ge=0, description="Seed of the paths")
 
@@ -271,9 +271,9 @@ def glass_frames(
     import xarray as xr
 
     from assets_defs.glass_scratches.layers import layers_of
-    from pipelines.colour import exposure, to_8bit
+    from pipelines.colour import to_8bit
     from pipelines.environments import sampler
-    from pipelines.glass_scratches.frames import furnace, moving_light, trace_frames
+    from pipelines.glass_scratches.frames import exposure, furnace, moving_light, trace_frames
     from pipelines.glass_scratches.layers import layer_arrays
     from pipelines.glass_scratches.path_tracing import make_surface
     from pipelines.glass_scratches.sampling import lobe_of
@@ -334,8 +334,7 @@ def glass_frames(
     white = furnace(solid, surface, settings.frame_seed)
     traced = (views.far, views.close)
     radiance = np.stack([picture.radiance for picture in traced])
-    scales = np.array([exposure(view) for view in radiance])
-    shown = (slice(None), None, None, None)
+    scale = exposure(light)
     pixels = ("view", "y", "x")
     furnace_pixels = ("furnace_row", "furnace_column")
     dataset = xr.Dataset(
@@ -343,10 +342,10 @@ def glass_frames(
             "radiance": ((*pixels, "channel"), radiance),
             "error": (pixels, np.sqrt(np.stack([picture.variance for picture in traced]))),
             "scratched": (pixels, np.stack([picture.scratched for picture in traced])),
-            "frames": ((*pixels, "channel"), to_8bit(radiance * scales[shown])),
-            "stage": ((*pixels, "channel"), to_8bit(views.stage * scales[shown])),
+            "frames": ((*pixels, "channel"), to_8bit(radiance * scale)),
+            "stage": ((*pixels, "channel"), to_8bit(views.stage * scale)),
             "moving": (("light", "row", "column", "channel"), moving),
-            "exposure": ("view", scales),
+            "exposure": ((), scale),
             "furnace": (furnace_pixels, white.radiance.mean(axis=2)),
             "furnace_error": (furnace_pixels, np.sqrt(white.variance)),
         }

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import exposure, to_8bit
-from pipelines.environments import Sampler, rotated, sampler, uniform
+from pipelines.colour import luminance, to_8bit
+from pipelines.environments import Sampler, rotated, sampler, solid_angles, uniform
 from pipelines.glass_scratches.path_tracing import Picture, Surface, trace
 from pipelines.glass_scratches.stage_view import ScratchedActor, draw
 from pipelines.raycasting import build_scene, first_hits
@@ -48,6 +48,14 @@ def cameras(solid: Solid) -> tuple[Camera, Camera]:
     x, y, z = (np.array(start) + float(hit) * way).tolist()
     close = orbit((x, y, z), _CLOSE_UP, _CLOSE_AZIMUTH, _CLOSE_ELEVATION, view_angle=_VIEW_ANGLE)
     return far, close
+
+
+def exposure(light: Sampler) -> float:
+    """Factor that shows a white matt surface, lit evenly by all of the environment, as 0.35: equal
+    for all scratches in the same light."""
+    bright = luminance(light.radiance.astype(np.float64))
+    solid = solid_angles(len(bright))[:, None]
+    return 0.35 * 4 * np.pi / float(np.sum(bright * solid))
 
 
 def trace_frames(
@@ -115,4 +123,4 @@ def moving_light(
         turned = sampler(rotated(light.radiance, 360.0 * number / count))
         drawn = draw(actor, turned, camera, width=size, height=size, supersampling=2)
         pictures.append(drawn[..., :3])
-    return to_8bit(np.stack(pictures) * exposure(np.stack(pictures)))
+    return to_8bit(np.stack(pictures) * exposure(light))

@@ -155,7 +155,7 @@ GLASS_FRAMES = Schema(
             "1",
             "The close view while the light goes around, by the shader",
         ),
-        "exposure": Variable(("view",), "float64", "1", "Factor on the radiance before sRGB"),
+        "exposure": Variable((), "float64", "1", "Factor on the radiance before sRGB"),
         "furnace": Variable(
             ("furnace_row", "furnace_column"),
             "float32",
