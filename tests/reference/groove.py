@@ -53,7 +53,7 @@ def table_brdf(
 ) -> NDArray[np.float64]:
     """f (N,) of the exact table for pairs (N, 2, 2), linear between the middles of the bins.
 
-    Finer bins than the paper's 256: with those, f where a wall comes into view would be 1.5 % off.
+    Finer bins than the paper's 256: with those, f is up to 1.5 % off where a wall comes into view.
     """
     from scipy.interpolate import RegularGridInterpolator
 
