@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
 from assets_defs.system import System
@@ -42,6 +43,41 @@ def make_pictures(store: VersionedStore) -> None:
             FOLDER / f"btf-{name}.png", optimize=True
         )
     _moving("btf-wall.webp", _wall(store))
+    _scratches(store)
+
+
+def _scratches(store: VersionedStore) -> None:
+    assert SCRATCHES.overview is not None
+    overview = SCRATCHES.overview(store, list(store.slots()))
+
+    def shown(asset: str, name: str, setting: str) -> NDArray[np.uint8]:
+        return _shown(store, SCRATCHES, asset, {"setting": setting}, name)
+
+    _column(
+        "scratches-tables.png",
+        *(shown("scratch_table_2d", "table", setting) for setting in ("setting-2", "worn")),
+    )
+    _row("scratches-furnace.png", _furnace(store))
+    _column(
+        "scratches-layers.png",
+        *(shown("scratch_layers", "stages", setting) for setting in ("setting-2", "worn")),
+    )
+    _row("scratches-frames.png", overview["plate-far"], overview["plate-close"])
+    _row("scratches-teapot.png", overview["teapot-far"], _beside_stage(store))
+    _row("scratches-specular.png", overview["plate-diffuse-beside-specular"])
+    _moving("scratches-light.webp", overview["plate-moving-light"])
+
+
+def _glass(store: VersionedStore, name: str, keys: dict[str, str]) -> NDArray[np.uint8]:
+    return _shown(store, SCRATCHES, "glass_frames", keys, name)
+
+
+def _furnace(store: VersionedStore) -> NDArray[np.uint8]:
+    return _glass(store, "furnace", {"object": "plate", "setting": "setting-2"})
+
+
+def _beside_stage(store: VersionedStore) -> NDArray[np.uint8]:
+    return _glass(store, "traced-beside-stage", {"object": "plate", "setting": "worn"})
 
 
 def _frames(store: VersionedStore, mesh: str, photo: str) -> NDArray[np.uint8]:
