@@ -17,6 +17,7 @@ import pytest
 from PIL import Image
 
 from assets_defs.definitions import SYSTEMS
+from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
 from assets_defs.neural_btf import BTF
@@ -75,6 +76,14 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "compressed_btf": {"abrdf_matrix", "abrdf_clusters", "neural_btf"},
         "restored_images": {"btf_images", "abrdf_matrix", "compressed_btf"},
         "cloth_frames": {"compressed_btf"},
+    }
+    assert _parents(house, SCRATCHES) == {
+        "scratch_profile": set(),
+        "scratch_table_2d": {"scratch_profile"},
+        "scratch_table": {"scratch_table_2d"},
+        "scratch_layers": set(),
+        "glass_object": set(),
+        "glass_frames": {"scratch_table_2d", "scratch_table", "scratch_layers", "glass_object"},
     }
     for system in SYSTEMS.values():
         assert [plan.schema for plan in system.plans.values()] == list(schemas_of(system.name))
