@@ -51,7 +51,7 @@ Strategy = Literal["importance", "uniform"]
 
 _BLOCK = 1 << 17
 _DEEPEST = 24
-_ROULETTE_FROM = 5
+_ROULETTE_FROM = 12
 _STRATIFIED = 4
 _LEAST_REFLECTED = 0.25
 _OFFSET = 2e-4
@@ -599,7 +599,7 @@ def _event(  # type: ignore[no-untyped-def]
     out = 1.0 if (paths.way[i] * face).sum() > 0.0 else -1.0
     paths.origin[i] = position + out * offset * face
     if depth >= _ROULETTE_FROM:
-        kept = min(paths.weight[i].max(), 0.98)
+        kept = min(4.0 * paths.weight[i].max(), 0.98)
         u, v = _numbers(seed, number, samples, depth, 3)
         if v >= kept:
             return
