@@ -15,13 +15,9 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
-
-# OpenMP first: the TBB that Open3D brings along is too old for numba, which says so aloud.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
 _CORNER = np.radians(20.0)
 

@@ -13,13 +13,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
-
-# OpenMP first: the TBB that Open3D brings along is too old for numba, which says so aloud.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
 X, Y, COSINE, SINE, HALF_LENGTH, HALF_WIDTH, CURVATURE, STRENGTH = range(8)
 """Columns of ``LayerArrays.shapes``."""

@@ -11,16 +11,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.bins import bin_edges, bin_weights
 from pipelines.glass_scratches.exact_table import check_albedo
-
-# OpenMP first: the TBB that Open3D brings along is too old for numba, which says so aloud.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
 PLACES = 16
 """Parts of the opening's width for which paths are counted apart."""

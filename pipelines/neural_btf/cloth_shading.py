@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from pipelines.neural_btf.fibre_brdf import (
     microfacets,
     transmitted,
 )
-
-# OpenMP first: the TBB that Open3D brings along is too old for numba, which says so aloud.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore[attr-defined]
 
 FloatArray = NDArray[np.float32]
 LEAST_COSINE = 1e-3  # of a view: interpolated normals turn away at silhouettes
