@@ -221,7 +221,7 @@ REGRESSIONS = (
     Regression("interpolation_error", tables, "lean_factors", _other_exponent, SETTING),
     Regression("largest_share", sampling, "make_lobe", _generous_sampler, SETTING),
     Regression("coverage_error", layers, "make_layers", _wide_scratches, SETTING),
-    Regression("map_error", layers, "coverage_maps", _moved_map, SETTING),
+    Regression("map_z", layers, "coverage_maps", _moved_map, SETTING),
     Regression("edge_error", solids, "plate", _holed, PLATE),
     Regression("volume", solids, "plate", _smaller, PLATE),
     Regression("not_finite", frames, "trace", _negative_pixel, KEYS),
