@@ -9,6 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+_STEPS = np.array(
+    [65537, 66047, 66571, 67129, 67651, 68171, 68711, 69257, 69809, 70351, 70901, 71437, 71987,
+     72547, 73079, 73613, 74159, 74717, 75253, 75793, 76333, 76871, 77417, 77969, 78511, 79063,
+     79609, 80153, 80701, 81239, 81817, 82351]
+)  # fmt: skip
+"""Primes above any number of samples allowed, so that steps of each are a permutation. Equal steps
+for two events would tie their numbers to each other."""
 _STRATIFIED = 4
 """Events of a path whose numbers are stratified."""
 
@@ -31,7 +38,8 @@ def unit(z):  # type: ignore[no-untyped-def]
 def _pair(pixel_seed, sample, samples, pair):  # type: ignore[no-untyped-def]
     """Two numbers of the R2 sequence (Roberts), its order and origin at random for pixel, pair."""
     h = mixed(pixel_seed + np.uint64(pair + 1) * np.uint64(0x9E3779B97F4A7C15))
-    index = (sample * 1000003 + np.int64(h >> np.uint64(40))) % samples
+    step = _STEPS[np.int64(h >> np.uint64(50)) % len(_STEPS)]
+    index = (sample * step + np.int64((h >> np.uint64(20)) & np.uint64(0xFFFFFF))) % samples
     u = unit(mixed(h + np.uint64(1))) + index * 0.7548776662466927
     v = unit(mixed(h + np.uint64(2))) + index * 0.5698402909980532
     return u - np.floor(u), v - np.floor(v)
