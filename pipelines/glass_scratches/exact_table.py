@@ -85,7 +85,7 @@ def solve(lit: Exchange, albedo: float) -> ExactTable:
     scale = np.pi / 2 * albedo * lit.width
     arriving = solve_triangular(factor, half, lower=True, trans="T")
     absorbed = (1 - albedo) * (lit.lengths @ arriving)
-    return ExactTable(scale * (rho + rho.T) / 2, absorbed, scale * arriving)
+    return ExactTable(scale * rho, absorbed, scale * arriving)
 
 
 def check_albedo(albedo: float) -> None:
