@@ -112,7 +112,7 @@ def glass_object(settings: ObjectSettings, source: Source) -> Result:
 class FrameSettings(Settings):
     """The pictures and their light."""
 
-    size: int = Field(208, ge=32, le=4096, description="Height and width of the pictures, pixels")
+    size: int = Field(180, ge=32, le=4096, description="Height and width of the pictures, pixels")
     samples: int = Field(16, ge=2, le=65_536, description="Light paths a pixel")
     environment: Annotated[str, UserFile] = Field(
         "lamps", description="lamps, sky, uniform, or an equirectangular .hdr or .exr file"
