@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numba
@@ -40,10 +41,11 @@ BINS = 32
 INDEX = 1.5
 CLEAN = LayerSpec(threshold=1e-6, length=0.5, width=0.1, layers=1)
 WORN = LayerSpec(length=0.3, width=0.05, coverage=0.3, layers=3)
-EVERYWHERE = LayerSpec(length=1.0, width=0.5, coverage=0.6, layers=16)
-"""Sixteen layers, of which each covers more than a half: 0.4^16 is left."""
+EVERYWHERE = LayerSpec(length=1.0, width=0.5, coverage=0.6, layers=10)
+"""Ten layers, of which each covers more than a half: 0.4^10 is left."""
 
 
+@functools.cache
 def surface(
     spec: LayerSpec,
     *,
@@ -187,7 +189,7 @@ def test_a_clear_plate_reflects_and_lets_through_what_a_slab_does(
     clean = surface(CLEAN)
     reflected = slab(degrees)
     for light, expected in ((halves(1, 0), reflected), (halves(0, 1), 1 - reflected)):
-        found = picture(pane, clean, light, facing(degrees), samples=256)
+        found = picture(pane, clean, light, facing(degrees), samples=128)
         assert not found.scratched.any()
         mean, error = block_means(found)
         assert np.abs(mean - expected).max() < 5 * error.max()
@@ -271,8 +273,9 @@ def let_out(index: float) -> tuple[Floats, float]:
     return factor[0], (1 - mean) / index**2
 
 
-@pytest.mark.parametrize("strategy", ["importance", "uniform"])
-@pytest.mark.parametrize("degrees", [0.0, 50.0])
+@pytest.mark.parametrize(
+    ("degrees", "strategy"), [(0.0, "importance"), (50.0, "importance"), (50.0, "uniform")]
+)
 def test_a_matt_plate_in_closed_form(pane: Solid, degrees: float, strategy: Strategy) -> None:
     """Scratched all over. Inside, light goes out at either face with the chance t, or back to the
     other one: of what entered (1 - F), 1 / (2 - t) comes out behind and the rest before."""
@@ -284,7 +287,7 @@ def test_a_matt_plate_in_closed_form(pane: Solid, degrees: float, strategy: Stra
     }
     for each in found.values():
         assert each.scratched.mean() > 0.999
-    # F depends on the lean along the scratches, which lie in 16 directions.
+    # F depends on the lean along the scratches, which lie in ten directions.
     way = np.array([math.sin(math.radians(degrees)), math.cos(math.radians(degrees))])
     angle = made.layers.angle.astype(np.float64)
     theta = np.arcsin(way[0] * np.cos(angle))
@@ -296,7 +299,7 @@ def test_a_matt_plate_in_closed_form(pane: Solid, degrees: float, strategy: Stra
     for side, expected in (("before", 1 - behind), ("behind", behind)):
         mean, error = block_means(found[side])
         assert mean.mean() == pytest.approx(expected, abs=5 * error.mean() / 4)
-        assert mean.mean() == pytest.approx(expected, rel=0.03)
+        assert mean.mean() == pytest.approx(expected, rel=0.04)
         assert (np.abs(mean - expected) < 6 * error).all()
 
 
@@ -316,6 +319,26 @@ def test_light_from_behind_a_matt_plate_is_not_forgotten(pane: Solid) -> None:
     z = (mean.mean() - other.mean()) / math.sqrt((error**2).mean() + (its_error**2).mean()) * 4
     assert abs(z) < 4.5
     assert error.mean() < its_error.mean() / 2
+
+
+# ---- noise -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("spec", "degrees", "light"),
+    [(CLEAN, 75.0, (1, 0)), (CLEAN, 0.0, (1, 0)), (EVERYWHERE, 0.0, (0, 1))],
+    ids=["clear and grazing", "clear", "matt"],
+)
+def test_the_noise_of_pixels_is_what_their_variance_says(
+    pane: Solid, spec: LayerSpec, degrees: float, light: tuple[float, float]
+) -> None:
+    """All pixels show the same here. Numbers of one event that are tied to those of another leave
+    each pixel its own error, which more samples do not help; stratified ones only lower it."""
+    found = picture(pane, surface(spec), halves(*light), facing(degrees), size=8, samples=512)
+    spread = found.radiance.mean(axis=2).std(ddof=1)
+    # 64 pixels know their spread to 9 %.
+    assert spread < 1.3 * math.sqrt(found.variance.mean())
+    assert spread > 0
 
 
 # ---- strategies ------------------------------------------------------------------------------
@@ -371,9 +394,9 @@ def test_from_afar_the_mean_coverage_is_met() -> None:
     mean = coverage_maps(layers, 64, 64).mean(axis=(1, 2))
     union = 1 - float(np.prod(1 - mean))
     made = surface(WORN, tile=0.01)
-    found = picture(plate(4.0, 4.0, 0.1), made, halves(1, 1), facing(height=1.0), samples=256)
+    found = picture(plate(4.0, 4.0, 0.1), made, halves(1, 1), facing(height=1.0))
     expected = met_in_all(union, union)
-    error = math.sqrt(expected * (1 - expected) / (256 * 16 * 16))
+    error = math.sqrt(expected * (1 - expected) / (64 * 16 * 16))
     assert found.scratched.mean() == pytest.approx(expected, abs=5 * error + 2e-3)
     assert union > 0.5
 
@@ -401,7 +424,6 @@ def test_filtered_and_exact_pictures_look_alike() -> None:
     near, filtered = (
         picture(
             solid, surface(WORN, resolution=resolution), light, facing(height=1.0), size=24,
-            samples=128,
         )
         for resolution in (4, 128)
     )  # fmt: skip
