@@ -11,6 +11,7 @@ from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
     import numpy as np
+    import xarray as xr
     from numpy.typing import NDArray
 
 SETTINGS = ("setting-1", "setting-2", "mirror", "worn")
@@ -43,25 +44,20 @@ def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
 
 def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
     """Walls, layers, glass and environment, before anything is made of them."""
-    from assets_defs.glass_scratches.frames import FrameSettings, environment
+    from assets_defs.glass_scratches.frames import FrameSettings, check_environment_setting
     from assets_defs.glass_scratches.layers import LayerSettings, layer_spec
     from assets_defs.glass_scratches.tables import TableSettings
-    from pipelines.glass_scratches.bins import check_bins
+    from pipelines.glass_scratches.tables import check_method
 
     walls = settings.get("scratch_table_2d")
     if isinstance(walls, TableSettings):
-        check_bins(walls.bins)
-        if walls.method == "exact" and walls.roughness != 1.0:
-            raise ValueError(
-                f"roughness is {walls.roughness:g} with the method exact; expected 1, or the "
-                "method paths."
-            )
+        check_method(walls.method, walls.roughness)
     scattered = settings.get("scratch_layers")
     if isinstance(scattered, LayerSettings):
         layer_spec(scattered).validate()
     shown = settings.get("glass_frames")
     if isinstance(shown, FrameSettings):
-        environment(shown)
+        check_environment_setting(shown)
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
@@ -70,26 +66,26 @@ def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDAr
 
     from pipelines.contact_sheet import contact_sheet
 
+    made: dict[str, dict[str, xr.Dataset]] = {}
+    for slot in slots:
+        if slot.asset == "glass_frames":
+            name, setting = slot.partition.split(".", 1)
+            made.setdefault(name, {})[setting] = store.open(slot)
     pictures: dict[str, NDArray[np.uint8]] = {}
-    for name in dict.fromkeys(slot.partition.split(".")[0] for slot in slots):
-        shown = {
-            slot.partition.split(".", 1)[1]: store.open(slot)
-            for slot in slots
-            if slot.asset == "glass_frames" and slot.partition.split(".")[0] == name
-        }
-        found = [shown[setting] for setting in (*SETTINGS, *shown) if setting in shown]
-        found = list({id(dataset): dataset for dataset in found}.values())
-        if len(found) > 1 and len({dataset["frames"].shape for dataset in found}) == 1:
-            for view, words in enumerate(("far", "close")):
-                sheet = np.stack([dataset["frames"].values[view] for dataset in found])
-                pictures[f"{name}-{words}"] = contact_sheet(sheet)
-        both = [shown[key] for key in ("setting-2", "mirror") if key in shown]
-        if len(both) == 2 and len({dataset["frames"].shape for dataset in both}) == 1:
+    for name, by_setting in made.items():
+        order = [setting for setting in SETTINGS if setting in by_setting]
+        shown = [by_setting[s] for s in dict.fromkeys([*order, *by_setting])]
+        frames = [dataset["frames"].values for dataset in shown]
+        if len(frames) < 2 or len({picture.shape for picture in frames}) > 1:
+            continue
+        for view, words in enumerate(("far", "close")):
+            pictures[f"{name}-{words}"] = contact_sheet(np.stack([one[view] for one in frames]))
+        if {"setting-2", "mirror"} <= set(by_setting):
             pictures[f"{name}-diffuse-beside-specular"] = np.hstack(
-                [np.vstack(list(dataset["frames"].values)) for dataset in both]
+                [np.vstack(list(by_setting[s]["frames"].values)) for s in ("setting-2", "mirror")]
             )
-        moving = [dataset["moving"].values for dataset in found]
-        if len(moving) > 1 and len({frames.shape for frames in moving}) == 1:
+        moving = [dataset["moving"].values for dataset in shown]
+        if len({turn.shape for turn in moving}) == 1:
             pictures[f"{name}-moving-light"] = np.stack(
                 [contact_sheet(np.stack(at)) for at in zip(*moving, strict=True)]
             )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from assets_defs.checks import Check, Checked
 from assets_defs.glass_scratches.declaration import ENVIRONMENTS, SCRATCHES
@@ -130,34 +131,47 @@ class FrameSettings(Settings):
     moving_size: int = Field(160, ge=32, le=2048, description="Their height and width, pixels")
     frame_seed: int = Field(0, ge=0, description="Seed of the paths")
 
+    @field_validator("environment")
+    @classmethod
+    def _found_again(cls, value: str) -> str:
+        """A file's whole path: a nightly run starts from elsewhere."""
+        return str(Path(value).resolve()) if Path(value).is_file() else value
+
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"size": 48, "samples": 8, "lights": 2, "moving_size": 48},
         "paper": {"size": 512, "samples": 64, "lights": 24, "moving_size": 320},
     }
 
 
-def environment(settings: FrameSettings) -> NDArray[np.float32]:
-    """The environment's radiance (H, 2 H, 3), turned. Raises ValueError, BadInput."""
-    from pathlib import Path
+def check_environment_setting(settings: FrameSettings) -> None:
+    """Raises ValueError, BadInput for what names no environment."""
+    if settings.environment not in ENVIRONMENTS:
+        _read_environment(settings.environment)
 
-    from pipelines import environments
+
+def _read_environment(name: str) -> NDArray[np.float32]:
     from storage.readers.environments import read_environment
 
-    if settings.environment in ENVIRONMENTS:
-        height = _ENVIRONMENT_HEIGHT
-        radiance = {
-            "lamps": lambda: environments.lamps(height),
-            "sky": lambda: environments.sky(height, sun_azimuth=-115.0, sun_elevation=38.0),
-            "uniform": lambda: environments.uniform(8),
-        }[settings.environment]()
-    elif Path(settings.environment).suffix:
-        radiance = read_environment(settings.environment)
-        environments.check_environment(radiance)
-    else:
+    if not Path(name).suffix:
         raise ValueError(
-            f"environment is {settings.environment!r}; expected {', '.join(ENVIRONMENTS)}, or an "
-            ".hdr or .exr file."
+            f"environment is {name!r}; expected {', '.join(ENVIRONMENTS)}, or an .hdr or .exr file."
         )
+    return read_environment(name)
+
+
+def environment(settings: FrameSettings) -> NDArray[np.float32]:
+    """The environment's radiance (H, 2 H, 3), turned. Raises as `check_environment_setting`."""
+    from pipelines import environments
+
+    height = _ENVIRONMENT_HEIGHT
+    if settings.environment == "lamps":
+        radiance = environments.lamps(height)
+    elif settings.environment == "sky":
+        radiance = environments.sky(height, sun_azimuth=-115.0, sun_elevation=38.0)
+    elif settings.environment == "uniform":
+        radiance = environments.uniform(8)
+    else:
+        radiance = _read_environment(settings.environment)
     return environments.rotated(radiance, settings.turn)
 
 

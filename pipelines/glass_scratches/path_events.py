@@ -71,6 +71,22 @@ class Paths(NamedTuple):
     seed: NDArray[np.uint64]
 
 
+class Outcome(NamedTuple):
+    """What an event adds, to be filled.
+
+    By the path's number: ``gathered`` (N, 3) radiance, and whether it ``met`` a scratch. By its
+    row: whether it is ``alive`` (goes on), and light ``offered`` from ``starts`` ``towards`` a
+    direction, to be added where nothing stands between.
+    """
+
+    gathered: NDArray[np.float64]
+    met: NDArray[np.bool_]
+    alive: NDArray[np.bool_]
+    starts: NDArray[np.float64]
+    towards: NDArray[np.float64]
+    offered: NDArray[np.float64]
+
+
 @njit(cache=True)
 def reflectance(cosine, ratio):  # type: ignore[no-untyped-def]
     """Fresnel's reflectance of unpolarised light and the cosine behind the surface.
@@ -126,76 +142,20 @@ def _scratch(surface, axis, facing, x, y, width, u, v):  # type: ignore[no-untyp
 
 @njit(cache=True, nogil=True)
 def advance(  # type: ignore[no-untyped-def]
-    first,
-    last,
-    shape,
-    surface,
-    environment,
-    paths,
-    distance,
-    triangle,
-    barycentric,
-    depth,
-    samples,
-    offset,
-    uniform,
-    gathered,
-    met,
-    alive,
-    starts,
-    towards,
-    offered,
+    first, last, shape, surface, environment, paths, hits, outcome, depth, samples, offset, uniform
 ):
-    """Take paths ``first`` to ``last`` - 1 to their next event, from what their rays met.
-
-    Fills, a row a path: ``gathered`` radiance and whether it ``met`` a scratch (by the path's
-    number), ``alive`` (goes on), and light ``offered`` from ``starts`` ``towards`` a direction, to
-    be added where nothing stands between.
-    """
+    """Take paths ``first`` to ``last`` - 1 to their next event, from what their rays met."""
     for i in range(first, last):
         _event(
-            shape,
-            surface,
-            environment,
-            paths,
-            i,
-            distance[i],
-            triangle[i],
-            barycentric[i],
-            depth,
-            samples,
-            offset,
-            uniform,
-            gathered,
-            met,
-            alive,
-            starts,
-            towards,
-            offered,
+            shape, surface, environment, paths, i, hits, outcome, depth, samples, offset, uniform
         )
 
 
 @njit(cache=True)
 def _event(  # type: ignore[no-untyped-def]
-    shape,
-    surface,
-    environment,
-    paths,
-    i,
-    distance,
-    triangle,
-    barycentric,
-    depth,
-    samples,
-    offset,
-    uniform,
-    gathered,
-    met,
-    alive,
-    starts,
-    towards,
-    offered,
+    shape, surface, environment, paths, i, hits, outcome, depth, samples, offset, uniform
 ):
+    distance, triangle = hits.distance[i], hits.triangle[i]
     number, seed = paths.number[i], paths.seed[i]
     way, weight = paths.way[i], paths.weight[i]
     if triangle < 0:
@@ -204,9 +164,9 @@ def _event(  # type: ignore[no-untyped-def]
         if paths.density[i] > 0.0 and not uniform:
             other = density_of(environment.density, way[0], way[1], way[2])
             share = paths.density[i] / (paths.density[i] + other)
-        gathered[number, 0] += weight[0] * r * share
-        gathered[number, 1] += weight[1] * g * share
-        gathered[number, 2] += weight[2] * b * share
+        outcome.gathered[number, 0] += weight[0] * r * share
+        outcome.gathered[number, 1] += weight[1] * g * share
+        outcome.gathered[number, 2] += weight[2] * b * share
         return
     if depth == DEEPEST - 1:
         return
@@ -216,7 +176,9 @@ def _event(  # type: ignore[no-untyped-def]
     normal = np.zeros(3)
     for corner in range(3):
         for axis in range(3):
-            normal[axis] += barycentric[corner] * shape.corner_normals[triangle, corner, axis]
+            normal[axis] += (
+                hits.barycentric[i, corner] * shape.corner_normals[triangle, corner, axis]
+            )
     normal /= np.sqrt((normal * normal).sum())
     outside = (way * face).sum() < 0.0
     if ((way * normal).sum() < 0.0) != outside:
@@ -241,7 +203,7 @@ def _event(  # type: ignore[no-untyped-def]
         v,
     )
     if found:
-        met[number] = True
+        outcome.met[number] = True
         goes_on = _scatter(
             surface,
             environment,
@@ -258,25 +220,23 @@ def _event(  # type: ignore[no-untyped-def]
             depth,
             samples,
             uniform,
-            towards,
-            offered,
+            outcome,
         )
-        starts[i] = position + offset * face
+        outcome.starts[i] = position + offset * face
     else:
         goes_on = True
         _pass(paths, i, normal, face, side, surface.refraction, u_choice, depth)
-        way = paths.way[i]
     if not goes_on:
         return
     out = 1.0 if (paths.way[i] * face).sum() > 0.0 else -1.0
     paths.origin[i] = position + out * offset * face
     if depth >= _ROULETTE_FROM:
         kept = min(4.0 * paths.weight[i].max(), 0.98)
-        u, v = path_numbers(seed, number, samples, depth, 3)
+        u, v = path_numbers(seed, number, samples, depth, 5)
         if v >= kept:
             return
         paths.weight[i] /= kept
-    alive[i] = True
+    outcome.alive[i] = True
 
 
 @njit(cache=True)
@@ -419,8 +379,7 @@ def _scatter(  # type: ignore[no-untyped-def]
     depth,
     samples,
     uniform,
-    towards,
-    offered,
+    outcome,
 ):
     """Light at a scratch: what the environment sends directly, and where the path goes on."""
     number, seed = paths.number[i], paths.seed[i]
@@ -439,10 +398,7 @@ def _scatter(  # type: ignore[no-untyped-def]
     u1, u2 = path_numbers(seed, number, samples, depth, 2)
     e1, e2 = path_numbers(seed, number, samples, depth, 3)
     paths.angle[i] = _SCATTERED_ANGLE
-    scale = 1.0  # of f cos for the light (iu, iv, in): what comes from outside
-
-    u3 = unit(mixed(seed + np.uint64((depth + 1) * samples + number % samples)))
-    u4 = unit(mixed(np.uint64(u3 * 9007199254740992.0) + np.uint64(11)))
+    u3, u4 = path_numbers(seed, number, samples, depth, 4)
     clear = u4 >= surface.roughness
     if clear and side < 0.0:
         return _let_out(surface, paths, i, along, across, normal, u_choice)
@@ -452,8 +408,7 @@ def _scatter(  # type: ignore[no-untyped-def]
         returned = factor * lobe.share[part, bin_of(ov, on, len(surface.gamma))]
         out_chance = max(returned / (returned + 1.0 - factor), _LEAST_REFLECTED)
     else:
-        returned = 1.0
-        factor = 0.0
+        factor = returned = 0.0  # not used from inside
         out_chance = 0.5
 
     if not uniform:
@@ -478,10 +433,10 @@ def _scatter(  # type: ignore[no-untyped-def]
             gain = scale / (density + out_chance * own)
             if gain > 0.0:
                 r, g, b = radiance_of(environment.radiance, ex, ey, ez)
-                towards[i, 0], towards[i, 1], towards[i, 2] = ex, ey, ez
-                offered[i, 0] = paths.weight[i, 0] * gain * r
-                offered[i, 1] = paths.weight[i, 1] * gain * g
-                offered[i, 2] = paths.weight[i, 2] * gain * b
+                outcome.towards[i, 0], outcome.towards[i, 1], outcome.towards[i, 2] = ex, ey, ez
+                outcome.offered[i, 0] = paths.weight[i, 0] * gain * r
+                outcome.offered[i, 1] = paths.weight[i, 1] * gain * g
+                outcome.offered[i, 2] = paths.weight[i, 2] * gain * b
 
     if u_choice < out_chance:  # the path goes on outside
         density = 0.0

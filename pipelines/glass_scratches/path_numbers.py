@@ -9,13 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-_STEPS = np.array(
-    [65537, 66047, 66571, 67129, 67651, 68171, 68711, 69257, 69809, 70351, 70901, 71437, 71987,
-     72547, 73079, 73613, 74159, 74717, 75253, 75793, 76333, 76871, 77417, 77969, 78511, 79063,
-     79609, 80153, 80701, 81239, 81817, 82351]
-)  # fmt: skip
-"""Primes above any number of samples allowed, so that steps of each are a permutation. Equal steps
-for two events would tie their numbers to each other."""
+PAIRS = 6
+"""Pairs of numbers that an event may use."""
 _STRATIFIED = 4
 """Events of a path whose numbers are stratified."""
 
@@ -35,11 +30,33 @@ def unit(z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def permuted(index, count, key):  # type: ignore[no-untyped-def]
+    """Where a permutation of 0 … count - 1, one for each key, sends an index.
+
+    Rounds of steps that can each be undone, on as many bits as the count has, until the result lies
+    inside. Events whose orders differed only by a shift would have their numbers tied to each
+    other: each pixel would keep an error that its variance does not tell.
+    """
+    bits = 1
+    while (1 << bits) < count:
+        bits += 1
+    mask, half = np.uint64((1 << bits) - 1), np.uint64((bits + 1) // 2)
+    x = np.uint64(index)
+    while True:
+        turn = key
+        for _ in range(4):
+            turn = mixed(turn + np.uint64(0x9E3779B97F4A7C15))
+            x = (x * (turn | np.uint64(1)) + (turn >> np.uint64(32))) & mask
+            x ^= x >> half
+        if x < np.uint64(count):
+            return np.int64(x)
+
+
+@njit(cache=True)
 def _pair(pixel_seed, sample, samples, pair):  # type: ignore[no-untyped-def]
     """Two numbers of the R2 sequence (Roberts), its order and origin at random for pixel, pair."""
     h = mixed(pixel_seed + np.uint64(pair + 1) * np.uint64(0x9E3779B97F4A7C15))
-    step = _STEPS[np.int64(h >> np.uint64(50)) % len(_STEPS)]
-    index = (sample * step + np.int64((h >> np.uint64(20)) & np.uint64(0xFFFFFF))) % samples
+    index = np.float64(permuted(sample, samples, h))
     u = unit(mixed(h + np.uint64(1))) + index * 0.7548776662466927
     v = unit(mixed(h + np.uint64(2))) + index * 0.5698402909980532
     return u - np.floor(u), v - np.floor(v)
@@ -62,7 +79,7 @@ def jitter_pixels(pixels, samples, seed, jitter, seeds):  # type: ignore[no-unty
 def path_numbers(seed, number, samples, depth, pair):  # type: ignore[no-untyped-def]
     """Two numbers for a path's event: stratified over the pixel's paths at first, then random."""
     sample = number % samples
-    which = 1 + 4 * depth + pair
+    which = 1 + PAIRS * depth + pair
     if depth < _STRATIFIED:
         return _pair(seed, sample, samples, which)
     h = mixed(seed + np.uint64(which * samples + sample + 1) * np.uint64(0x9E3779B97F4A7C15))

@@ -31,12 +31,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.environments import Sampler
+from pipelines.glass_scratches.bins import bin_weights
 from pipelines.glass_scratches.layer_kernels import LayerArrays
 from pipelines.glass_scratches.layers import flatten_pyramid, pyramid
-from pipelines.glass_scratches.path_events import DEEPEST, Facing, Paths, Surface, advance
+from pipelines.glass_scratches.path_events import (
+    DEEPEST,
+    Facing,
+    Outcome,
+    Paths,
+    Surface,
+    advance,
+)
 from pipelines.glass_scratches.path_numbers import jitter_pixels
 from pipelines.glass_scratches.sampling import Lobe
-from pipelines.glass_scratches.tables import Lean, check_index
+from pipelines.glass_scratches.tables import Lean, check_index, interpolated_factor
 from pipelines.raycasting import build_scene, first_hits, occluded
 
 if TYPE_CHECKING:
@@ -78,7 +86,6 @@ def make_surface(
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
     flat, offsets = flatten_pyramid(pyramid(coverage))
-    head_on, gamma = lean.factor[0], lean.gamma
     return Surface(
         layers,
         flat,
@@ -87,22 +94,18 @@ def make_surface(
         tile,
         lobe,
         roughness,
-        head_on,
-        gamma,
+        lean.factor[0],
+        lean.gamma,
         index,
-        _mean_factor(head_on, gamma),
+        _mean_factor(lean),
     )
 
 
-def _mean_factor(head_on: NDArray[np.float64], gamma: NDArray[np.float64]) -> float:
+def _mean_factor(lean: Lean) -> float:
     """F over the hemisphere weighted by the cosine: cos phi dphi / 2 times (2 / pi) cos² theta."""
-    from pipelines.glass_scratches.bins import bin_weights
-
     theta = (np.arange(512) + 0.5) / 512 * np.pi / 2
-    lean_weight = np.cos(theta) ** 2 / np.sum(np.cos(theta) ** 2)
-    share = (2 * theta[:, None] / np.pi) ** gamma
-    factor = share + (1 - share) * head_on
-    return float(lean_weight @ factor @ bin_weights(len(gamma)) / 2)
+    weight = np.cos(theta) ** 2 / np.sum(np.cos(theta) ** 2)
+    return float(weight @ interpolated_factor(lean, theta) @ bin_weights(len(lean.gamma)) / 2)
 
 
 def trace(
@@ -184,7 +187,6 @@ class _View(NamedTuple):
     forward: NDArray[np.float64]
     right: NDArray[np.float64]
     up: NDArray[np.float64]
-    height: int
     pixel: float
     parallel: bool
 
@@ -208,7 +210,7 @@ def _view(camera: Camera, width: int, height: int) -> _View:
     if parallel:
         position = position + pixel * (corner[0] * right + corner[1] * upward)
         start = forward
-    return _View(position, start, pixel * right, -pixel * upward, height, pixel, parallel)
+    return _View(position, start, pixel * right, -pixel * upward, pixel, parallel)
 
 
 def _start(view: _View, pixels: NDArray[np.int64], width: int, samples: int, seed: int) -> Paths:
@@ -244,31 +246,24 @@ def _trace_block(scene, shape, surface, environment, paths, samples, offset, uni
     met = np.zeros(count, np.bool_)
     rays = 0
     for depth in range(DEEPEST):
-        found = first_hits(scene, paths.origin, paths.way)
-        rays += len(paths.number)
-        alive = np.zeros(len(paths.number), np.bool_)
-        towards = np.zeros((len(paths.number), 3))
-        offered = np.zeros((len(paths.number), 3))
-        starts = np.zeros((len(paths.number), 3))
+        hits = first_hits(scene, paths.origin, paths.way)
+        left = len(paths.number)
+        rays += left
+        starts, towards, offered = (np.zeros((left, 3)) for _ in range(3))
+        alive = np.zeros(left, np.bool_)
+        outcome = Outcome(gathered, met, alive, starts, towards, offered)
         _in_threads(
-            len(paths.number),
+            left,
             shape,
             surface,
             environment,
             paths,
-            found.distance,
-            found.triangle,
-            found.barycentric,
+            hits,
+            outcome,
             depth,
             samples,
             offset,
             uniform,
-            gathered,
-            met,
-            alive,
-            starts,
-            towards,
-            offered,
         )
         asked = np.flatnonzero(offered.any(axis=1))
         if len(asked):

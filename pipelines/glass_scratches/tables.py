@@ -60,12 +60,8 @@ def scratch_table(
     for an exact table of walls that are not diffuse, and as the two methods do.
     """
     blur_of(roughness)
+    check_method(method, roughness)
     if method == "exact":
-        if roughness != 1.0:
-            raise ValueError(
-                f"roughness is {roughness:g} with the method exact; expected 1, or the method "
-                "paths."
-            )
         lit = exchange(profile, bins, facets)
         solved = solve(lit, albedo)
         seen = seen_facets(lit, bins, PLACES * _FINE)
@@ -87,6 +83,14 @@ def scratch_table(
         )
     )
     return Table2D(made.rho, made.standard_error, made.absorbed, made.across.astype(np.float32))
+
+
+def check_method(method: Method | None, roughness: float) -> None:
+    """Raises ValueError for an exact table of walls that are not diffuse."""
+    if method == "exact" and roughness != 1.0:
+        raise ValueError(
+            f"roughness is {roughness:g} with the method exact; expected 1, or the method paths."
+        )
 
 
 def _across(

@@ -360,7 +360,6 @@ def test_importance_and_uniform_sampling_agree(shape: str, roughness: float, tea
     assert abs((a - b).sum() / np.sqrt((error**2).sum())) < 4
     # Samples are stratified: less noise than their variance has it, never more.
     assert np.sqrt(np.mean(z**2)) < 1.4
-    assert a.mean() == pytest.approx(b.mean(), rel=0.05)
 
 
 # ---- far and near ----------------------------------------------------------------------------
