@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines import geometry
+from pipelines import geometry, mesh_repair
 from pipelines.teapot_patches import BOTTOM, HANDLE, KNOB, LID, LOWER_BODY, RIM, SPOUT, UPPER_BODY
 
 if TYPE_CHECKING:
@@ -74,8 +74,7 @@ def check_closed(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     points, faces = np.array(vertices, np.float64), np.array(triangles)
     geometry.check_arrays(points, faces)
     points, faces = _welded(points, faces)
-    neighbours, agree = _neighbours(faces)
-    surface = _oriented(faces, neighbours, agree)
+    surface = _oriented(faces)
     parts = _signed_volumes(points, faces)
     volume = np.bincount(surface, parts)
     # A flat surface's parts cancel out but for rounding; the least of bubbles leaves far more.
@@ -86,7 +85,7 @@ def check_closed(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
             "expected surfaces around some material"
         )
     is_cavity = _depths(points, faces, surface) % 2 == 1
-    _turn_over(faces, ((volume < 0) != is_cavity)[surface])
+    mesh_repair.turn_over(faces, ((volume < 0) != is_cavity)[surface])
     return ClosedMesh(points, faces.astype(np.int32))
 
 
@@ -115,67 +114,31 @@ def _welded(
     return positions, faces
 
 
-def _neighbours(
-    triangles: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Pairs of triangles (E, 2) that share an edge, and whether both have the same side outside.
-
-    Raises ValueError where an edge is not shared by exactly two triangles.
-    """
-    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    ends = np.stack([np.minimum(start, end), np.maximum(start, end)], axis=-1)
-    _, edge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
-    if (count > 2).any():
-        raise ValueError(
-            f"{int((count > 2).sum())} edges are in more than two triangles; "
-            "expected two at each edge of a closed mesh"
-        )
-    if (count < 2).any():
-        raise ValueError(
-            f"the mesh is open along {int((count < 2).sum())} border edges; "
-            "expected two triangles at each edge of a closed mesh"
-        )
-    pairs = np.argsort(edge.reshape(-1), kind="stable").reshape(-1, 2)
-    return pairs // 3, start[pairs[:, 0]] != start[pairs[:, 1]]
-
-
-def _oriented(
-    triangles: NDArray[np.int64], neighbours: NDArray[np.int64], agree: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _oriented(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     """Turn triangles over, in place, until all neighbours agree; the surface (F,) each is part of.
 
-    Each triangle stands for two, as it is and turned over, linked to its neighbours' that agree
-    with it: a surface with two sides falls into two parts, one for each way to orient it.
+    Raises ValueError where an edge is not shared by exactly two triangles, and for surfaces that
+    have one side only.
     """
-    count = len(triangles)
-    surface = _connected(neighbours, count)
-    first, second = neighbours.T
-    other = np.where(agree, 0, count)
-    as_is = np.stack([first, second + other], axis=-1)
-    turned = np.stack([first + count, second + count - other], axis=-1)
-    part = _connected(np.concatenate([as_is, turned]), 2 * count)
-    one_sided = int(np.unique(surface[part[:count] == part[count:]]).size)
-    if one_sided:
+    edges = mesh_repair.edges(triangles)
+    if (edges.uses > 2).any():
         raise ValueError(
-            f"{one_sided} of {surface.max() + 1} surfaces have one side only; "
+            f"{int((edges.uses > 2).sum())} edges are in more than two triangles; "
+            "expected two at each edge of a closed mesh"
+        )
+    if (edges.uses < 2).any():
+        raise ValueError(
+            f"the mesh is open along {int((edges.uses < 2).sum())} border edges; "
+            "expected two triangles at each edge of a closed mesh"
+        )
+    surface, turned, one_sided = mesh_repair.sides(edges.pairs(), edges.forwards)
+    if one_sided.any():
+        raise ValueError(
+            f"{int(one_sided.sum())} of {len(one_sided)} surfaces have one side only; "
             "expected an inside and an outside"
         )
-    _, example = np.unique(surface, return_index=True)
-    _turn_over(triangles, part[:count] != part[example][surface])
+    mesh_repair.turn_over(triangles, turned)
     return surface
-
-
-def _connected(links: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    return np.asarray(label, np.int64)
-
-
-def _turn_over(triangles: NDArray[np.int64], which: NDArray[np.bool_]) -> None:
-    triangles[which] = triangles[which][:, [0, 2, 1]]
 
 
 def _signed_volumes(

@@ -7,7 +7,7 @@ import json
 import struct
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,13 +54,24 @@ def read_mesh(path: str | PathLike[str]) -> MeshFile:
     """
     file = Path(path)
     mesh = _read_polygons(file)
-    _check_polygons(file, mesh)
+    check_polygons(file, mesh)
     triangles, owners = triangulate(mesh.positions, mesh.sizes, mesh.corners)
     _check_areas(file, mesh.positions[mesh.corners[triangles]], owners)
-    return _split_by_uv(mesh, triangles)
+    return split_by_uv(mesh, triangles)
 
 
 def _read_polygons(file: Path) -> PolygonMesh:
+    found = mesh_format(file)
+    if found == "glb":
+        return read_glb(file).mesh
+    return read_ply(file) if found == "ply" else read_obj(file).mesh
+
+
+def mesh_format(file: Path) -> Literal["ply", "obj", "glb"]:
+    """The format of a file, by its first bytes; OBJ by its name.
+
+    Raises BadInput for a file that is missing, unreadable, a directory, or of another format.
+    """
     if file.is_dir():
         raise BadInput(file, "file", "a directory", FORMATS)
     try:
@@ -71,18 +82,21 @@ def _read_polygons(file: Path) -> PolygonMesh:
     except OSError as error:
         raise BadInput(file, "file", f"unreadable ({error.strerror})", FORMATS) from error
     if start == b"glTF":
-        return _read_glb(file)
+        return "glb"
     if start[:3] == b"ply" and start[3:].isspace():
-        return read_ply(file)
+        return "ply"
     if file.suffix.lower() == ".obj":  # plain text, without a mark of its own
-        return read_obj(file)
+        return "obj"
     raise BadInput(file, "format", "unknown" if start else "unknown (the file is empty)", FORMATS)
 
 
 # --- Checks -------------------------------------------------------------------------------------
 
 
-def _check_polygons(file: Path, mesh: PolygonMesh) -> None:
+def check_polygons(file: Path, mesh: PolygonMesh) -> None:
+    """Raise BadInput for a mesh without polygons, for polygons of less than three corners, with
+    references to vertices that do not exist, and for positions or texture coordinates of their
+    corners that are not finite."""
     if len(mesh.sizes) == 0:
         points = f"{len(mesh.positions)} points without faces"
         raise BadInput(file, "content", points, "at least one face")
@@ -129,7 +143,9 @@ def _check_areas(file: Path, triangles: NDArray[np.float64], owners: NDArray[np.
         raise BadInput(file, f"face {faces[0]}", found, "three distinct corners not on a line")
 
 
-def _split_by_uv(mesh: PolygonMesh, triangles: NDArray[np.int64]) -> MeshFile:
+def split_by_uv(mesh: PolygonMesh, triangles: NDArray[np.int64]) -> MeshFile:
+    """The vertices that polygons have, once for each of their texture coordinates, and triangles
+    (F, 3) of them, given as numbers of corners."""
     if mesh.corner_uvs is None:
         used, corners = np.unique(mesh.corners, return_inverse=True)
         return MeshFile(mesh.positions[used], corners.reshape(-1)[triangles], None)
@@ -142,12 +158,28 @@ def _split_by_uv(mesh: PolygonMesh, triangles: NDArray[np.int64]) -> MeshFile:
 # --- GLB ----------------------------------------------------------------------------------------
 
 
-def _read_glb(file: Path) -> PolygonMesh:
-    """Through trimesh, which turns the texture coordinates' origin from the top left (glTF 2.0)
-    to the bottom left."""
+class GlbFile(NamedTuple):
+    """``mesh``, all meshes as the scene's nodes place them, its parts rows of ``primitives``;
+    ``primitives`` and ``materials``, as in the file's JSON, not checked."""
+
+    mesh: PolygonMesh
+    primitives: list[dict[str, Any]]
+    materials: Any
+
+
+def read_glb(file: Path) -> GlbFile:
+    """Read a GLB file through trimesh, which turns the texture coordinates' origin from the top
+    left (glTF 2.0) to the bottom left.
+
+    Raises BadInput for a file that is truncated, damaged or of another version, and for
+    geometry that trimesh would get wrong.
+    """
     import trimesh
 
-    data = _geometry_only(file, file.read_bytes())
+    description, binary = _chunks(file, file.read_bytes())
+    primitives = [dict(primitive) for primitive in _primitives(description)]
+    materials = description.get("materials", [])
+    data = _geometry_only(description, binary)
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
         nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
@@ -155,6 +187,7 @@ def _read_glb(file: Path) -> PolygonMesh:
     except Exception as error:  # by what is broken: KeyError, ValueError, AssertionError, ...
         raise BadInput(file, "content", "damaged", "a complete GLB file") from error
     positions, corners, uvs, count = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [], 0
+    parts = [np.zeros(0, np.int64)]
     for geometry, matrix in placed:
         if not isinstance(geometry, trimesh.Trimesh):
             continue  # points and lines
@@ -169,14 +202,18 @@ def _read_glb(file: Path) -> PolygonMesh:
         corners.append(triangles.ravel() + count)
         count += len(vertices)
         uvs.append(_glb_uvs(geometry, triangles))
+        looks: Any = geometry.visual
+        parts.append(np.full(len(triangles), int(looks.material.name)))
     complete = [uv for uv in uvs if uv is not None]
     joined = np.concatenate(corners)
-    return PolygonMesh(
+    mesh = PolygonMesh(
         np.concatenate(positions),
         np.full(len(joined) // 3, 3, np.int64),
         joined,
         np.concatenate(complete) if complete and len(complete) == len(uvs) else None,
+        np.concatenate(parts),
     )
+    return GlbFile(mesh, primitives, materials)
 
 
 def _glb_uvs(geometry: trimesh.Trimesh, triangles: NDArray[np.int64]) -> NDArray[np.float64] | None:
@@ -186,29 +223,36 @@ def _glb_uvs(geometry: trimesh.Trimesh, triangles: NDArray[np.int64]) -> NDArray
     return np.asarray(uv, np.float64)[triangles.ravel()]
 
 
-def _geometry_only(file: Path, data: bytes) -> bytes:
-    """A GLB (glTF 2.0, 4.4: header, a chunk of JSON, a binary chunk) as trimesh can read it:
-    every primitive with the same blank material. It drops the texture coordinates of a
-    primitive without a material, and decodes pictures that are not needed here."""
+def _chunks(file: Path, data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON of a GLB (glTF 2.0, 4.4: header, a chunk of JSON, a binary chunk), and what comes
+    after it."""
     try:
         version, length, json_length = struct.unpack_from("<4xIII", data)
         if len(data) < length:
             raise ValueError
-        description = json.loads(data[20 : 20 + json_length])
+        description: dict[str, Any] = json.loads(data[20 : 20 + json_length])
         required = set(description.get("extensionsRequired", ()))
         _check_plain(file, version, required, description)
-        for primitive in _primitives(description):
-            primitive["material"] = 0
     except BadInput:
         raise
     except (struct.error, ValueError, AttributeError, TypeError, LookupError):
         raise BadInput(file, "content", "truncated or damaged", "a complete GLB file") from None
-    description["materials"] = [{}]
+    return description, data[20 + json_length : length]
+
+
+def _geometry_only(description: dict[str, Any], binary: bytes) -> bytes:
+    """A GLB as trimesh can read it, ``description`` changed to its JSON: every primitive has a
+    blank material, named by the primitive's number. Trimesh drops the texture coordinates of a
+    primitive without a material, and decodes pictures that are not needed here."""
+    primitives = _primitives(description)
+    for number, primitive in enumerate(primitives):
+        primitive["material"] = number
+    description["materials"] = [{"name": f"{number}"} for number in range(len(primitives))]
     for unused in ("images", "textures", "samplers"):
         description.pop(unused, None)
     text = json.dumps(description).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + data[20 + json_length : length]
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + binary
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 

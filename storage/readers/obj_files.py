@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions, texture coordinates and polygons.
+"""Wavefront OBJ: positions, texture coordinates, polygons and what they belong to.
 
 Read here and not by trimesh: it takes indices counted from the end of the list so far as
 counted from the end of the file, and cuts every vertex short where one line is (both seen).
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,30 @@ from storage.readers.bad_input import BadInput
 from storage.readers.polygons import PolygonMesh
 
 
-def read_obj(file: Path) -> PolygonMesh:
-    """Read ``v``, ``vt`` and ``f`` of an OBJ file; all objects and groups go into one mesh.
+class ObjPart(NamedTuple):
+    """What polygons have in common: the names that ``o``, ``g`` and ``usemtl`` gave last before
+    them, '' for none. A name is all of the line, spaces and number signs included."""
+
+    object: str = ""
+    group: str = ""
+    material: str = ""
+
+
+class ObjFile(NamedTuple):
+    """``mesh``, whose parts are rows of ``parts``, in the order in which they have their first
+    polygons; ``libraries``, what each ``mtllib`` line names: one or more files."""
+
+    mesh: PolygonMesh
+    parts: tuple[ObjPart, ...]
+    libraries: tuple[str, ...]
+
+
+def read_obj(file: Path) -> ObjFile:
+    """Read ``v``, ``vt``, ``f`` and the names of parts of an OBJ file; all go into one mesh.
 
     Texture coordinates count from the bottom left; they are None unless every corner has one.
+    Material libraries are not opened.
+
     Raises BadInput, naming the line, for numbers that are missing or no numbers, and for
     references to vertices that do not exist.
     """
@@ -27,6 +48,8 @@ def read_obj(file: Path) -> PolygonMesh:
     sizes: list[int] = []
     corners: list[int] = []
     corner_uvs: list[int | None] = []
+    libraries: list[str] = []
+    part, rows, parts = ObjPart(), dict[ObjPart, int](), list[int]()
     text = file.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
     for number, line in enumerate(text.splitlines(), start=1):
         keyword, *words = line.split("#", 1)[0].split() or [""]
@@ -39,21 +62,37 @@ def read_obj(file: Path) -> PolygonMesh:
                 if len(words) < 3:
                     raise ValueError("at least three corners")
                 sizes.append(len(words))
+                parts.append(rows.setdefault(part, len(rows)))
                 for word in words:
                     corner, uv = _corner(word, len(positions), len(uvs))
                     corners.append(corner)
                     corner_uvs.append(uv)
+            elif keyword == "o":
+                part = ObjPart(_name(line), "", part.material)
+            elif keyword == "g":
+                part = part._replace(group=_name(line))
+            elif keyword == "usemtl":
+                part = part._replace(material=_name(line))
+            elif keyword == "mtllib":
+                libraries.append(_name(line))
         except ValueError as error:
             shown = line.strip()[:60]
             raise BadInput(file, f"line {number}", f"'{shown}'", str(error)) from None
     mapped = [uv for uv in corner_uvs if uv is not None]
     complete = len(mapped) == len(corners) > 0
-    return PolygonMesh(
+    mesh = PolygonMesh(
         np.array(positions, np.float64).reshape(-1, 3),
         np.array(sizes, np.int64),
         np.array(corners, np.int64),
         np.array(uvs, np.float64)[mapped] if complete else None,
+        np.array(parts, np.int64),
     )
+    return ObjFile(mesh, tuple(rows), tuple(libraries))
+
+
+def _name(line: str) -> str:
+    """Not cut at a number sign: 3ds Max calls its materials "Material #25"."""
+    return " ".join(line.split()[1:])
 
 
 def _numbers(words: list[str], count: int) -> list[float]:

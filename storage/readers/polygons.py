@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 class PolygonMesh(NamedTuple):
     """``positions`` (P, 3) float64; ``sizes`` (F,) int64, corners of each polygon; ``corners``
     (sum of sizes,) int64, the position of each corner, one polygon after the other;
-    ``corner_uvs`` (sum of sizes, 2) float64, or None."""
+    ``corner_uvs`` (sum of sizes, 2) float64, or None; ``parts`` (F,) int64, which part of the
+    file each polygon is in (what a part is, the reader says), or None where the format has none."""
 
     positions: NDArray[np.float64]
     sizes: NDArray[np.int64]
     corners: NDArray[np.int64]
     corner_uvs: NDArray[np.float64] | None
+    parts: NDArray[np.int64] | None = None
 
 
 def triangulate(

@@ -1,0 +1,57 @@
+"""The visible share of a spherical Gaussian as a formula: for shaders, where looking up is slow.
+
+With k = sqrt(1 + λ) and s = sin d the share's logit is nearly an odd polynomial in x = k s whose
+coefficients are polynomials in 1 / k. They were fitted to ``visible_integral``: off by 0.0017 at
+most for λ >= 2 and |d| <= pi/2. Beyond, where caps go on, x grows by 0.65 k a radian: off by 0.004
+for λ >= 2.5. In Mesa's software renderer it takes an eighth of the time of the table.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_FIRST = (-0.20853, -1.80264, 0.07427, 1.61209)  # of x; coefficients of 1/k³ first
+_THIRD = (-1.83388, 1.30114, -0.17395, 0.05101)
+_FIFTH = 0.0055
+_BEYOND = 0.65
+_SINE = (0.0076143, -0.1660510)  # off by 2e-4 up to pi/2
+_MOST = 80.0
+
+
+def edge_share(distance: ArrayLike, sharpness: ArrayLike) -> NDArray[np.float64]:
+    """f(d, λ) / integral(λ) in [0, 1], float64, nearly; distances in radians; broadcast."""
+    d = np.asarray(distance, np.float64)
+    away = np.minimum(np.abs(d), math.pi / 2)
+    sine = away * np.polyval((*_SINE, 1.0), away * away)
+    k = np.sqrt(1 + np.asarray(sharpness, np.float64))
+    x = k * np.copysign(sine + _BEYOND * (np.abs(d) - away), d)
+    first, third = np.polyval(_FIRST, 1 / k), np.polyval(_THIRD, 1 / k)
+    squared = x * x
+    logit = x * (first + squared * (third + squared * _FIFTH))
+    return 1 / (1 + np.exp(-np.clip(logit, -_MOST, _MOST)))
+
+
+def _horner(coefficients: tuple[float, ...], variable: str) -> str:
+    code = repr(coefficients[0])
+    for value in coefficients[1:]:
+        code = f"({code} * {variable} + {value!r})"
+    return code
+
+
+EDGE_SHARE_GLSL = f"""
+float edgeShare(float d, float k) {{  // k = sqrt(1 + sharpness)
+  float size = abs(d), away = min(size, {math.pi / 2!r});
+  float squared = away * away, narrow = 1.0 / k;
+  float sine = away * {_horner((*_SINE, 1.0), "squared")};
+  float x = k * (sine + {_BEYOND!r} * (size - away));
+  squared = x * x;
+  float logit = x * ({_horner(_FIRST, "narrow")}
+    + squared * ({_horner(_THIRD, "narrow")} + squared * {_FIFTH!r}));
+  logit = min(logit, {_MOST!r});
+  return 1.0 / (1.0 + exp(d < 0.0 ? logit : -logit));
+}}
+"""
+"""GLSL of ``edge_share``."""

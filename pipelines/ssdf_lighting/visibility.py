@@ -1,0 +1,120 @@
+"""Which directions each vertex sees the sky in: V(ω) of the paper's Eq. 1.
+
+Rays start a little off the surface. How little is a matter of the triangles around the vertex:
+too far and they leak through a thin gap or see under the horizon, too near and rounding makes
+them hit the surface they start from. Where another surface touches the vertex, the side that is
+still free is taken, and where none is, the vertex is sealed and sees nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.raycasting import occluded
+
+if TYPE_CHECKING:
+    from open3d.t.geometry import RaycastingScene
+
+FloatArray = NDArray[np.float64]
+
+LIFT = 1e-4
+"""Height of the rays' origins, in mean lengths of the edges at the vertex."""
+_LEAST_LIFT = 3e-6
+"""In extents of the scene, whose positions are single precision: some fifty of their steps."""
+
+
+class RayOrigins(NamedTuple):
+    """Where the rays of each vertex start: ``points`` (V, 3) float32; ``sealed`` (V,) bool, the
+    vertices that other surfaces cover on all sides."""
+
+    points: NDArray[np.float32]
+    sealed: NDArray[np.bool_]
+
+
+def ray_origins(
+    scene: RaycastingScene,
+    vertices: FloatArray,
+    triangles: NDArray[np.integer],
+    normals: FloatArray,
+) -> RayOrigins:
+    """Origins just off the surface, on its outer side.
+
+    vertices (V, 3), each position once; triangles (F, 3); normals (V, 3) unit; ``scene`` holds
+    the same triangles in the same order. A first choice lies above the vertex along its normal.
+    Where something else is in between or touches, points above each triangle at the vertex are
+    tried, moved a little into the triangle. Half of the height is used where another surface is
+    nearer than that.
+    """
+    lift = _lifts(vertices, triangles)
+    points, free = _lifted(scene, triangles, vertices, np.arange(len(vertices)), normals, lift)
+    corners = triangles.ravel().astype(np.int64)
+    trouble = np.flatnonzero(~free[corners])
+    sealed = ~free
+    if len(trouble):
+        face, vertex = trouble // 3, corners[trouble]
+        a, b, c = vertices[triangles[face]].transpose(1, 0, 2)
+        face_normal = np.cross(b - a, c - a)
+        face_normal /= np.linalg.norm(face_normal, axis=1, keepdims=True)
+        inward = (a + b + c) / 3.0 - vertices[vertex]
+        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+        start = vertices[vertex] + 4.0 * lift[vertex, None] * inward
+        there, found = _lifted(scene, triangles, start, vertex, face_normal, lift[vertex])
+        first_free = np.flatnonzero(found)[::-1]  # the last write, the first triangle, wins
+        points[vertex[first_free]] = there[first_free]
+        sealed[vertex[first_free]] = False
+    return RayOrigins(points.astype(np.float32), sealed)
+
+
+def visible_directions(
+    scene: RaycastingScene, origins: RayOrigins, directions: FloatArray
+) -> NDArray[np.bool_]:
+    """V (P, D): whether the ray from each of P origins in each of D directions (D, 3) is free."""
+    count, ways = len(origins.points), directions.astype(np.float32)
+    blocked = occluded(
+        scene, np.repeat(origins.points, len(ways), axis=0), np.tile(ways, (count, 1))
+    )
+    return ~blocked.reshape(count, -1) & ~origins.sealed[:, None]
+
+
+def _lifts(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
+    edges = np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, -1, axis=1)], axis=2)
+    sums, counts = np.zeros(len(vertices)), np.zeros(len(vertices))
+    for corner in (triangles, np.roll(triangles, -1, axis=1)):
+        np.add.at(sums, corner, edges)
+        np.add.at(counts, corner, 1.0)
+    extent = np.linalg.norm(np.ptp(vertices, axis=0))
+    lifts: FloatArray = np.maximum(LIFT * sums / np.maximum(counts, 1.0), _LEAST_LIFT * extent)
+    return lifts
+
+
+def _lifted(
+    scene: RaycastingScene,
+    triangles: NDArray[np.integer],
+    starts: FloatArray,
+    vertex: NDArray[np.integer],
+    normals: FloatArray,
+    lift: FloatArray,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Points above surface points ``starts`` of vertices, and whether nothing else is between.
+
+    What the way up meets is looked for from a little below to twice the height: what touches the
+    surface would be missed by a ray that starts on it.
+    """
+    import open3d as o3d
+
+    below = starts - 0.25 * lift[:, None] * normals
+    rays = np.concatenate([below, normals], axis=1).astype(np.float32)
+    met = scene.list_intersections(o3d.core.Tensor.from_numpy(rays))
+    splits, height = met["ray_splits"].numpy().astype(np.int64), met["t_hit"].numpy()
+    ray = np.repeat(np.arange(len(starts)), np.diff(splits))
+    own = (triangles[met["primitive_ids"].numpy()] == vertex[ray, None]).any(axis=1)
+    height = height - 0.25 * lift[ray]
+    other = ~own & (height < 2.0 * lift[ray])
+    touching = np.zeros(len(starts), bool)
+    touching[ray[other & (height <= 0.1 * lift[ray])]] = True
+    nearest = 2.0 * lift
+    np.minimum.at(nearest, ray[other], height[other])
+    return starts + 0.5 * np.maximum(nearest, 0.0)[:, None] * normals, ~touching
