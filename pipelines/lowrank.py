@@ -78,3 +78,52 @@ def _centred(block: NDArray[np.floating]) -> NDArray[np.float32]:
 
 def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.linalg.qr(columns)[0].astype(np.float32)
+
+
+class RightSingularVectors(NamedTuple):
+    """A matrix (rows, columns), nothing taken off, is about ``(matrix @ vectors) @ vectors.T``."""
+
+    vectors: NDArray[np.float32]
+    """(columns, rank), orthonormal; the most important first."""
+    singular_values: NDArray[np.float64]
+    """(rank,)."""
+    lost: float
+    """Sum of the squares of what is left out."""
+
+
+def right_singular_vectors(gram: NDArray[np.float64], lost: float) -> RightSingularVectors:
+    """The fewest right singular vectors that leave out at most ``lost``, a sum of squares.
+
+    ``gram`` (columns, columns) is the matrix' transpose times the matrix: summed over blocks of
+    rows it has one size whatever their number. Subspace iteration, its rank doubled until it is
+    enough; where that comes near to all of them, a complete eigendecomposition.
+    """
+    columns = len(gram)
+    total = float(np.trace(gram))
+    single = gram.astype(np.float32)
+    random = np.random.default_rng(0)
+    basis = random.standard_normal((columns, 0), dtype=np.float32)
+    width = 128
+    while True:
+        if 2 * width >= columns:
+            values, vectors = np.linalg.eigh(gram)
+            break
+        more = random.standard_normal((columns, width - basis.shape[1]), dtype=np.float32)
+        basis = _orthonormal(np.concatenate([basis, more], axis=1))
+        for _ in range(4):
+            basis = _orthonormal(single @ basis)
+        values, turned = np.linalg.eigh(basis.T.astype(np.float64) @ gram @ basis)
+        vectors = basis @ turned
+        # The last few of the subspace are not its matrix' own yet.
+        values, vectors = values[_OVERSAMPLING:], vectors[:, _OVERSAMPLING:]
+        if total - float(values.sum()) <= lost:
+            break
+        width *= 2
+    squares = np.maximum(values[::-1], 0.0)
+    left = np.maximum(total - np.cumsum(squares), 0.0)
+    rank = min(int(np.searchsorted(-left, -lost)) + 1, columns)
+    signed = vectors[:, ::-1][:, :rank]
+    signed = signed * np.where(signed[np.abs(signed).argmax(axis=0), np.arange(rank)] < 0, -1, 1)
+    return RightSingularVectors(
+        signed.astype(np.float32), np.sqrt(squares[:rank]), float(left[rank - 1])
+    )

@@ -3,10 +3,10 @@
 A frame: the axes of all lobes at the vertices follow from normals, view and lights; the caller
 says how far the edge of the visible sky is there; these distances become vertex attributes, four
 in a vector, and are interpolated. A pixel makes its own lobes of the interpolated normal and its
-view, and takes their visible shares from the table (``shading.shaded``).
+view, and takes their visible shares (``shading.shaded``; the table as a formula, :mod:`.edge_share`).
 
 Nothing is built anew for a frame: distances are written into the arrays of the mesh, lights and
-the eye into a float texture.
+the eye are uniforms (whose values, other than their names, VTK changes without a new shader: seen).
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.ssdf_lighting.camera_rays import eye
+from pipelines.ssdf_lighting.cosine_lobes import CosineLobes
 from pipelines.ssdf_lighting.edge_share import EDGE_SHARE_GLSL, edge_share
 from pipelines.ssdf_lighting.gloss_lobes import COLUMNS as GLOSS_COLUMNS
+from pipelines.ssdf_lighting.gloss_lobes import GlossLobes
 from pipelines.ssdf_lighting.lobe_axes import AxisTables, lobe_axes
 from pipelines.ssdf_lighting.microfacets import LEAST_VIEW, Materials
 from pipelines.ssdf_lighting.numpy_view import DistancesAt
@@ -28,17 +30,20 @@ from pipelines.stage import Camera, Shader, Stage, surface, texture
 
 MOST_LIGHTS = 24
 """Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
+_FINE = 2048
+"""Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
 
 
 class LitActor:
-    """A mesh on the stage, lit by N <= 24 spherical Gaussians, in one draw call.
+    """A mesh on the stage, lit by N <= 24 spherical Gaussians.
 
     vertices, normals: (V, 3), normals of length 1; triangles: (F, 3), each inside one object.
     object_of_vertex: (V,) rows of ``materials``.
     lights: those of the first frame; others of the same number may follow.
 
-    ``actor`` is for ``Stage.add``. Raises ValueError for more lights, as ``lobe_tables`` does, and
-    for objects that have no material.
+    ``actors`` are for ``Stage.add``: all that is glossy, then all that is not. Software renderers
+    take both sides of a branch; so what has no gloss has a shader without. Raises ValueError for
+    more lights, as ``lobe_tables`` does, and for objects that have no material.
     """
 
     def __init__(
@@ -63,36 +68,27 @@ class LitActor:
         self._points = np.ascontiguousarray(vertices, np.float32)
         self._normals = np.ascontiguousarray(normals, np.float32)
         self._objects = objects.astype(np.int32)
-        self._count = count
-        has_gloss = bool((materials.specular > 0).any())
-        groups = -(-count // 4)
-        names = [f"edge{number}" for number in range(groups * (2 if has_gloss else 1))]
-        self._sharpness = lights.sharpness
-        self._tables = lobe_tables(materials, lights)
-        self._axis_tables = AxisTables(self._tables, materials.specular > 0)
-        shares = visible_table()
-        self._textures = {
-            "shares": texture(np.ascontiguousarray(shares.values[::-1, :, None])),
-            "matt": _fixed(self._matt_rows()),
-            "gloss": _fixed(_gloss_rows(self._tables)),
-            "materials": _fixed(_material_rows(materials)),
-            "lights": _fixed(np.zeros((2, count + 1, 4), np.float32)),
-        }
-        self.actor = surface(
-            self._points,
-            triangles,
-            attributes={
-                "shading": self._normals,
-                "object": objects,
-                # Each its own: the mesh keeps them, and they are written to.
-                **{name: np.zeros((len(self._points), 4), np.float32) for name in names},
-            },
-            textures=self._textures,
-            shader=_shader(names, count, has_gloss),
-            lit=False,
-        )
-        self._arrays, self._edges = _arrays_of(self.actor, names)
-        self._light_rows = _memory_of(self._textures["lights"])
+        self._sharpness = np.array(lights.sharpness)
+        tables = lobe_tables(materials, lights)
+        self._axis_tables = AxisTables(tables, materials.specular > 0)
+        corners = np.asarray(triangles)
+        glossy = materials.specular[objects[corners[:, 0]]] > 0
+        self._parts = [
+            _Part(
+                self._points,
+                corners[chosen],
+                self._normals,
+                objects,
+                materials,
+                tables,
+                has_gloss=has_gloss,
+            )
+            # First what is likely in front: less is painted over.
+            for has_gloss, chosen in ((True, glossy), (False, ~glossy))
+            if chosen.any()
+        ]
+        self.actors = [part.actor for part in self._parts]
+        self._set_lights(np.zeros(4), lights)
 
     def relight(self, camera: Camera, lights: Lights, distances_at: DistancesAt) -> None:
         """Make the next frame show this view and these lights.
@@ -101,15 +97,18 @@ class LitActor:
         there is no gloss, and returns d (V, 2 N), radians. Raises ValueError for another number of
         lights than before and for distances of another shape.
         """
-        if len(lights.sharpness) != self._count:
-            raise ValueError(f"there are {len(lights.sharpness)} lights; expected {self._count}.")
+        if len(lights.sharpness) != len(self._sharpness):
+            raise ValueError(
+                f"there are {len(lights.sharpness)} lights; expected {len(self._sharpness)}."
+            )
         if not np.array_equal(lights.sharpness, self._sharpness):
-            self._take_sharpness(lights)
+            self._sharpness = np.array(lights.sharpness)
+            tables = lobe_tables(self._materials, lights)
+            self._axis_tables = AxisTables(tables, self._materials.specular > 0)
+            for part in self._parts:
+                part.show_tables(tables)
         self.show_distances(distances_at(self.axes(camera, lights)))
-        self._light_rows[0, :-1, :3], self._light_rows[0, :-1, 3] = lights.axes, lights.sharpness
-        self._light_rows[1, :-1, :3] = lights.amplitudes
-        self._light_rows[0, -1] = eye(camera)
-        self._textures["lights"].GetInput().Modified()
+        self._set_lights(eye(camera), lights)
 
     def axes(self, camera: Camera, lights: Lights) -> NDArray[np.float32]:
         """Axes (V, 2 N, 3) float32 of the lobes at the vertices."""
@@ -119,29 +118,74 @@ class LitActor:
 
     def show_distances(self, distances: NDArray[np.floating]) -> None:
         """Put distances (V, 2 N) at the lobes' axes into the vertex attributes."""
-        expected = (len(self._points), 2 * self._count)
+        expected = (len(self._points), 2 * len(self._sharpness))
         if distances.shape != expected:
             raise ValueError(f"distances: found shape {distances.shape}, expected {expected}.")
+        for part in self._parts:
+            part.show_distances(distances)
+
+    def _set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
+        for part in self._parts:
+            part.set_lights(seen_from, lights)
+
+
+class _Part:
+    """The triangles of a lit mesh that share a shader; only their vertices."""
+
+    def __init__(
+        self,
+        points: NDArray[np.float32],
+        triangles: NDArray[np.integer],
+        normals: NDArray[np.float32],
+        objects: NDArray[np.integer],
+        materials: Materials,
+        tables: LobeTables,
+        *,
+        has_gloss: bool,
+    ) -> None:
+        self._chosen, corners = np.unique(triangles, return_inverse=True)
+        self._count = count = len(tables.cosine.irradiance)
+        self._matt = _fixed(_matt_rows(tables.cosine))
+        textures = {"matt": self._matt, "materials": _fixed(_material_rows(materials))}
+        if has_gloss:
+            textures["gloss"] = _fixed(_gloss_rows(tables.gloss))
+        names = [f"edge{number}" for number in range(-(-count // 4) * (1 + has_gloss))]
+        self.actor = surface(
+            points[self._chosen],
+            corners.reshape(-1, 3),
+            attributes={
+                "shading": normals[self._chosen],
+                "object": objects[self._chosen],
+                # Each its own: the mesh keeps them, and they are written to.
+                **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
+            },
+            textures=textures,
+            shader=_shader(names, count, has_gloss),
+            lit=False,
+        )
+        self._arrays, self._edges = _arrays_of(self.actor, names)
+        self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
+
+    def show_tables(self, tables: LobeTables) -> None:
+        _memory_of(self._matt)[:] = _matt_rows(tables.cosine)
+        self._matt.GetInput().GetPointData().GetScalars().Modified()
+        self._matt.GetInput().Modified()
+
+    def show_distances(self, distances: NDArray[np.floating]) -> None:
         groups = -(-self._count // 4)
         for number, (array, values) in enumerate(zip(self._arrays, self._edges, strict=True)):
-            part, group = divmod(number, groups)
-            first = part * self._count + 4 * group
+            half, group = divmod(number, groups)
             width = min(4, self._count - 4 * group)
-            values[:, :width] = distances[:, first : first + width]
+            first = half * self._count + 4 * group
+            values[:, :width] = distances[self._chosen, first : first + width]
             array.Modified()
 
-    def _take_sharpness(self, lights: Lights) -> None:
-        self._sharpness = lights.sharpness
-        self._tables = lobe_tables(self._materials, lights)
-        self._axis_tables = AxisTables(self._tables, self._materials.specular > 0)
-        _memory_of(self._textures["matt"])[:] = self._matt_rows()
-        self._textures["matt"].GetInput().Modified()
-
-    def _matt_rows(self) -> NDArray[np.float32]:
-        lobes = self._tables.cosine
-        whole = whole_shares(lobes, visible_table())
-        rows = np.stack([lobes.irradiance / np.pi, lobes.sharpness, 1 / whole], axis=-1)
-        return rows.astype(np.float32)
+    def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
+        rows = np.column_stack([lights.axes, lights.sharpness])
+        self._uniforms.SetUniform4f("eye", seen_from.tolist())
+        for number, (row, colour) in enumerate(zip(rows, lights.amplitudes, strict=True)):
+            self._uniforms.SetUniform4f(f"towards{number}", row.tolist())
+            self._uniforms.SetUniform3f(f"colour{number}", colour.tolist())
 
 
 def draw_lit(
@@ -153,19 +197,42 @@ def draw_lit(
 ) -> NDArray[np.float32]:
     """Linear radiance and coverage (height, width, 4) of the lit mesh.
 
-    ``stage`` is the one that holds ``actor.actor``, or the size (width, height) of a new one for
-    this picture alone.
+    ``stage`` is the one that holds ``actor.actors``, or the size (width, height) of a new one for
+    this picture alone. Raises ValueError as ``LitActor.relight``.
     """
     if not isinstance(stage, Stage):
         with Stage(*stage) as made:
-            made.add(actor.actor)
+            made.add(*actor.actors)
             return draw_lit(made, actor, camera, lights, distances_at)
     actor.relight(camera, lights, distances_at)
     stage.look(camera)
     return stage.radiance()
 
 
-# ---- memory of the graphics library ------------------------------------------------------------
+# ---- tables and memory of the graphics library -------------------------------------------------
+
+
+def _matt_rows(lobes: CosineLobes) -> NDArray[np.float32]:
+    """(N, _FINE + 1, 3): irradiance / pi, sqrt(1 + λ), 1 / share at the horizon."""
+    cosine = np.linspace(-1.0, 1.0, lobes.irradiance.shape[1])
+    horizon = np.arcsin(np.clip(lobes.along * cosine + lobes.up, -1.0, 1.0))
+    whole = edge_share(horizon, lobes.sharpness)
+    coarse = np.stack([lobes.irradiance / np.pi, np.sqrt(1 + lobes.sharpness), 1 / whole])
+    place = np.linspace(0.0, coarse.shape[2] - 1.0, _FINE + 1)
+    left = np.minimum(place.astype(np.int64), coarse.shape[2] - 2)
+    fine = coarse[..., left] + (place - left) * (coarse[..., left + 1] - coarse[..., left])
+    return np.moveaxis(fine, 0, -1).astype(np.float32)
+
+
+def _gloss_rows(lobes: GlossLobes) -> NDArray[np.float32]:
+    return np.stack(lobes, axis=-1).astype(np.float32)
+
+
+def _material_rows(materials: Materials) -> NDArray[np.float32]:
+    rows = np.zeros((2, len(materials.specular), 4), np.float32)
+    rows[0, :, :3], rows[0, :, 3] = materials.albedo, materials.specular
+    rows[1, :, 0] = materials.roughness
+    return rows
 
 
 def _fixed(rows: NDArray[np.float32]) -> Any:
@@ -190,17 +257,6 @@ def _arrays_of(actor: Any, names: list[str]) -> tuple[list[Any], list[NDArray[np
     points = actor.GetMapper().GetInput().GetPointData()
     arrays = [points.GetArray(name) for name in names]
     return arrays, [vtk_to_numpy(array) for array in arrays]
-
-
-def _gloss_rows(tables: LobeTables) -> NDArray[np.float32]:
-    return np.stack(tables.gloss, axis=-1).astype(np.float32)
-
-
-def _material_rows(materials: Materials) -> NDArray[np.float32]:
-    rows = np.zeros((2, len(materials.specular), 4), np.float32)
-    rows[0, :, :3], rows[0, :, 3] = materials.albedo, materials.specular
-    rows[1, :, 0] = materials.roughness
-    return rows
 
 
 # ---- the shader --------------------------------------------------------------------------------
@@ -292,25 +348,21 @@ def _gloss(count: int) -> str:
     groups = -(-count // 4)
     lights = "".join(
         f"""
-    lit += colour{number} * gleam(towards{number}, edge{groups + number // 4}Out[{number % 4}],
-      normal, view, towards, from, roughness, index, constant);"""
+  lit += colour{number} * gleam(towards{number}, edge{groups + number // 4}Out[{number % 4}],
+    normal, view, towards, from, roughness, index, constant);"""
         for number in range(count)
     )
-    # A loop without a round is skipped; llvmpipe runs the body of an "if" that is false.
     return f"""
-  int rounds = look.a > 0.0 ? 1 : 0;
-  for (int round = 0; round < rounds; round++) {{
-    vec3 view = normalize(eye.xyz - eye.w * placeOut);
-    float facing = dot(normal, view);
-    float seen = clamp(facing, {LEAST_VIEW!r}, 1.0);
-    float column = seen * {GLOSS_COLUMNS - 1}.0;
-    int left = min(int(column), {GLOSS_COLUMNS - 2});
-    vec4 from = mix(texelFetch(gloss, ivec2(left, row), 0),
-                    texelFetch(gloss, ivec2(left + 1, row), 0), column - float(left));
-    vec3 towards = normalize(from.y * (2.0 * facing * normal - view) + from.z * normal);
-    float roughness = texelFetch(materials, ivec2(row, 1), 0).r;
-    float index = (1.0 + sqrt(look.a)) / (1.0 - sqrt(look.a));
-    float constant = smith(seen, roughness)
-      / (12.56637061 * roughness * roughness * seen);{lights}
-  }}
+  vec3 view = normalize(eye.xyz - eye.w * placeOut);
+  float facing = dot(normal, view);
+  float seen = clamp(facing, {LEAST_VIEW!r}, 1.0);
+  float column = seen * {GLOSS_COLUMNS - 1}.0;
+  int left = min(int(column), {GLOSS_COLUMNS - 2});
+  vec4 from = mix(texelFetch(gloss, ivec2(left, row), 0),
+                  texelFetch(gloss, ivec2(left + 1, row), 0), column - float(left));
+  vec3 towards = normalize(from.y * (2.0 * facing * normal - view) + from.z * normal);
+  float roughness = texelFetch(materials, ivec2(row, 1), 0).r;
+  float index = (1.0 + sqrt(look.a)) / (1.0 - sqrt(look.a));
+  float constant = smith(seen, roughness)
+    / (12.56637061 * roughness * roughness * seen);{lights}
 """

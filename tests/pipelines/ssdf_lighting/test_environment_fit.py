@@ -92,13 +92,13 @@ def test_a_sum_of_gaussians_is_found_again() -> None:
 
 def test_a_small_lamp_is_in_its_direction_with_its_colour() -> None:
     light = np.full((64, 128, 3), 1e-3, np.float32)
-    light[20, 33] = (50.0, 20.0, 5.0)
+    light[20, 33] = (5000.0, 2000.0, 500.0)
     fit = fit_lights(light, 2)
     brightest = int(np.argmax(fit.lights.amplitudes[:, 0]))
     cosine = float(fit.lights.axes[brightest] @ texel_directions(64)[20, 33])
     assert cosine > math.cos(math.radians(0.3))
     power = fit.lights.amplitudes[brightest] * integral(fit.lights.sharpness[brightest])
-    np.testing.assert_allclose(power, np.array([50, 20, 5]) * solid_angles(64)[20], rtol=0.02)
+    np.testing.assert_allclose(power, np.array([5000, 2000, 500]) * solid_angles(64)[20], rtol=0.02)
 
 
 # ---- maps ------------------------------------------------------------------------------------
@@ -116,11 +116,12 @@ def test_a_clear_sky_has_its_sun_and_its_dome(clear: NDArray[np.float32], clear_
 
     ways = texel_directions(64)
     dome, found = averaged(clear, 64), evaluate(lights, ways)
-    away = ways @ towards(40.0, 35.0) < math.cos(math.radians(25.0))
+    away = ways @ towards(40.0, 35.0) < math.cos(math.radians(12.0))
     away &= np.abs(ways[..., 2]) > 0.15  # the horizon is an edge
     ratio = (found / dome)[away]
-    assert 0.5 < ratio.min() < ratio.max() < 1.6
+    assert 0.6 < ratio.min() < ratio.max() < 1.7
     assert np.sqrt(np.mean((ratio - 1) ** 2)) < 0.15
+    assert np.sqrt(np.mean((ratio[:, 1] - 1) ** 2)) < 0.08
 
 
 def test_irradiance_is_near(clear: NDArray[np.float32], clear_fit: Fit) -> None:
@@ -135,12 +136,12 @@ def test_irradiance_is_near(clear: NDArray[np.float32], clear_fit: Fit) -> None:
     ("light", "count"),
     [
         (lamps(96), 5),
-        (lamps(96), 24),
+        (lamps(96), 20),
         (uniform(8, 3e-5), 3),
         (np.float32(1e30) * lamps(10), 1),
         (np.exp(np.random.default_rng(3).normal(0, 3, (6, 12, 3))).astype(np.float32), 8),
     ],
-    ids=["lamps-5", "lamps-24", "uniform", "one", "rough"],
+    ids=["lamps-5", "lamps-20", "uniform", "one", "rough"],
 )
 def test_the_flux_is_conserved_in_each_channel(light: NDArray[np.float32], count: int) -> None:
     fit = fit_lights(light, count)
