@@ -18,6 +18,7 @@ a vertex i of cluster c. `fit` makes the codes for a step; `searched` finds the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,10 @@ _KEPT = 0.2
 """A vector is kept where its energy is more than this times q² an entry that it costs."""
 _ROUNDING = 0.38
 """Sizes are rounded up from 1 - this on: smaller than half, since zeros cost least."""
+MEMORY_STEP = 0.5
+"""Step of the shared basis in memory over q: there it is rounded once more, in space."""
+_ROUNDS, _NEAR = 16, 0.99
+"""Of the search: steps tried at most, and what is near enough to the budget."""
 _LEVELS_PER_OCTAVE = 4
 """Singular values are kept to this; only the product of both halves has to be exact."""
 
@@ -112,8 +117,7 @@ def fit(
     basis: SharedBasis, cluster: NDArray[np.int32], factors: list[ClusterFactors], step: float
 ) -> Compact:
     """Round everything to a step q (radians), and leave out what is not worth its bits."""
-    directions, most = basis.vectors.shape
-    rank = _worth(basis.sigma, step, directions)
+    rank = _worth(basis.sigma, step, len(basis.vectors))
     shared_level = _levels(basis.sigma[:rank], step)
     scaled = basis.vectors[:, :rank].T.astype(np.float64) * sigma_of(shared_level, step)[:, None]
     centres, bases, levels, ranks, weights = [], [], [], [], []
@@ -205,7 +209,7 @@ def coordinates(compact: Compact) -> NDArray[np.float32]:
 
 
 def squared_error(basis: SharedBasis, compact: Compact) -> float:
-    """Sum of squares of the error in the weighted domain, without touching the matrix.
+    """Sum of squares of the error in memory, in the weighted domain, without touching the matrix.
 
     Vectors of the shared basis are orthonormal before rounding: what the clusters miss in them,
     what rounding adds to them, and what they leave out are at right angles but for second order.
@@ -215,13 +219,13 @@ def squared_error(basis: SharedBasis, compact: Compact) -> float:
     missed[:, :rank] -= coordinates(compact)
     off = shared_vectors(compact) - basis.vectors[:, :rank].T
     rounding = (basis.sigma[:rank] ** 2 * (off.astype(np.float64) ** 2).sum(axis=1)).sum()
-    return float((missed**2).sum() + rounding + basis.lost)
+    again = compact.shared.size * (MEMORY_STEP * compact.step) ** 2 / 12.0
+    return float((missed**2).sum() + rounding + again + basis.lost)
 
 
-def searched(
-    basis: SharedBasis, cluster: NDArray[np.int32], rmse: float, *, rounds: int = 12
-) -> Compact:
-    """The codes of the largest step whose RMSE (radians, weighted by solid angle) is ``rmse``.
+def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Compact:
+    """The codes of about the largest step whose RMSE (radians, weighted by solid angle) is at most
+    ``rmse``. ``cluster`` (V,) of the vertices, without gaps.
 
     Raises ValueError where the shared basis alone misses more than that.
     """
@@ -232,20 +236,52 @@ def searched(
             f"the error asked for is {rmse:g} rad; expected more than the "
             f"{(basis.lost / entries) ** 0.5:.2g} rad that the shared basis leaves out."
         )
-    low, high = 0.0, np.pi
-    step = 20.0 * rmse
+
+    def measured(tried: Compact) -> float:
+        return float((squared_error(basis, tried) / entries) ** 0.5)
+
+    return _largest(lambda step: fit(basis, cluster, factors, step), measured, rmse, 20.0 * rmse)
+
+
+def searched_for_bytes(
+    basis: SharedBasis,
+    cluster: NDArray[np.int32],
+    count: Callable[[Compact], int],
+    budget: int,
+) -> Compact:
+    """The codes of about the smallest step that ``count`` (of bytes) finds within the budget.
+
+    Raises ValueError where no step does.
+    """
+    factors = factorise(basis, cluster)
+    return _largest(
+        lambda fineness: fit(basis, cluster, factors, 1.0 / fineness), count, float(budget), 5.0
+    )
+
+
+def _largest(
+    make: Callable[[float], Compact],
+    measured: Callable[[Compact], float],
+    limit: float,
+    start: float,
+) -> Compact:
+    """What ``make`` makes of about the largest number whose measure, which grows with it, is within
+    the limit. Raises ValueError where none is found."""
+    low, high, number = 0.0, np.inf, start
     best = None
-    for _ in range(rounds):
-        tried = fit(basis, cluster, factors, step)
-        reached = (squared_error(basis, tried) / entries) ** 0.5
-        if reached <= rmse:
-            low, best = step, tried
-            if reached > 0.995 * rmse:
+    for _ in range(_ROUNDS):
+        tried = make(number)
+        found = measured(tried)
+        if found <= limit:
+            low, best = number, tried
+            if found > _NEAR * limit:
                 break
         else:
-            high = step
-        guess = step * (rmse / reached) ** 1.2
-        step = guess if low < guess < high else (low + high) / 2
+            high = number
+        guess = number * limit / max(found, 1e-300)
+        if not low < guess < high:
+            guess = np.sqrt(max(low, high / 16.0) * min(high, low * 16.0)) if low else high / 4.0
+        number = float(guess)
     if best is None:
-        raise ValueError(f"no step of at most {step:g} rad reaches an error of {rmse:g} rad.")
+        raise ValueError(f"{limit:g} is out of reach; expected more.")
     return best

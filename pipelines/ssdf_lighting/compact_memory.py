@@ -15,18 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.ssdf_lighting.compact import (
+    MEMORY_STEP,
     Codes,
     Compact,
-    FloatArray,
     shared_vectors,
     sigma_of,
 )
 from pipelines.ssdf_lighting.weighted_sphere import root_weights
 
 Bytes = NDArray[np.uint8]
-
-_FINER = 0.5
-"""Step of the shared basis over the step of the file, whose rounding it comes on top of."""
 
 
 class Packed(NamedTuple):
@@ -66,7 +63,7 @@ class Packed(NamedTuple):
 
 def packed(compact: Compact) -> Packed:
     """Pack codes for memory."""
-    shared_scale = _FINER * compact.step / sigma_of(compact.shared_level, compact.step)
+    shared_scale = MEMORY_STEP * compact.step / sigma_of(compact.shared_level, compact.step)
     shared = np.rint(shared_vectors(compact) / shared_scale[:, None]).astype(np.int32).T
     sizes, order = compact.sizes, compact.vertices_in_order
     place = np.empty(len(order), np.int64)
@@ -165,28 +162,14 @@ def cluster_bases(memory: Packed) -> ClusterBases:
     )
 
 
-def vertex_weights(memory: Packed, vertices: NDArray[np.integer]) -> list[NDArray[np.float32]]:
-    """Weights (m,) of each of some vertices: one read of its bytes each."""
-    found = []
-    for vertex in vertices:
-        cluster = int(memory.cluster[vertex])
-        bits = memory.weight_bits[memory.first[cluster] : memory.first[cluster + 1]]
-        length = row_bytes(bits)
-        start = int(memory.weight_start[cluster]) + int(memory.place[vertex]) * length
-        codes = unpack_rows(memory.weights[None, start : start + length], bits)[0]
-        found.append((codes * memory.step).astype(np.float32))
-    return found
-
-
-def decoded(
-    memory: Packed, bases: ClusterBases, vertices: NDArray[np.integer]
-) -> NDArray[np.float32]:
-    """d (vertices, D) float32, radians, of some vertices."""
-    distances = np.empty((len(vertices), bases.centres.shape[1]), np.float32)
-    clusters = memory.cluster[vertices].astype(np.int64)
-    for cluster in np.unique(clusters):
-        wanted = np.flatnonzero(clusters == cluster)
-        vectors = bases.vectors[bases.first[cluster] : bases.first[cluster + 1]]
-        weights = np.stack(vertex_weights(memory, vertices[wanted]))
-        distances[wanted] = bases.centres[cluster] + weights @ vectors
+def vertex_distances(memory: Packed, bases: ClusterBases, vertex: int) -> NDArray[np.float32]:
+    """d (D,) float32, radians, of one vertex: one read of its bytes."""
+    cluster = int(memory.cluster[vertex])
+    own = slice(bases.first[cluster], bases.first[cluster + 1])
+    bits = memory.weight_bits[own]
+    length = row_bytes(bits)
+    start = int(memory.weight_start[cluster]) + int(memory.place[vertex]) * length
+    codes = unpack_rows(memory.weights[None, start : start + length], bits)[0]
+    weights = (codes * memory.step).astype(np.float32)
+    distances: NDArray[np.float32] = bases.centres[cluster] + weights @ bases.vectors[own]
     return distances

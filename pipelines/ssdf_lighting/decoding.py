@@ -86,16 +86,31 @@ def decoder_of(memory: Packed) -> Decoder:
     return make_decoder(bases.centres, bases.vectors, bases.first, cluster, weights, start[:-1])
 
 
-def distances_along(decoder: Decoder, axes: Floats) -> Floats:
-    """d (V, L) float32, radians, along unit vectors (V, L, 3) float32 of every vertex."""
+def decoded_rows(decoder: Decoder, vertices: NDArray[np.integer]) -> Floats:
+    """d (vertices, D) float32, radians, of some vertices in all directions."""
+    distances = np.empty((len(vertices), decoder.resolution**2), np.float32)
+    clusters = decoder.cluster[vertices]
+    for cluster in np.unique(clusters):
+        wanted = np.flatnonzero(clusters == cluster)
+        rank = decoder.rank[cluster]
+        begin = decoder.table_start[cluster]
+        table = decoder.table[begin : begin + distances.shape[1] * (rank + 1)]
+        places = decoder.weight_start[vertices[wanted]][:, None] + np.arange(rank)
+        weights = np.pad(decoder.weights[places], ((0, 0), (1, 0)), constant_values=1.0)
+        distances[wanted] = weights @ table.reshape(-1, rank + 1).T
+    return distances
+
+
+def distances_along(decoder: Decoder, vertices: NDArray[np.integer], axes: Floats) -> Floats:
+    """d (P, L) float32, radians, of vertices (P,) along unit vectors (P, L, 3) float32."""
     found = np.empty(axes.shape[:2], np.float32)
     _decode(
         decoder.table,
         decoder.table_start,
         decoder.rank,
-        decoder.cluster,
+        decoder.cluster[vertices],
         decoder.weights,
-        decoder.weight_start,
+        decoder.weight_start[vertices],
         decoder.resolution,
         np.ascontiguousarray(axes, dtype=np.float32),
         found,
@@ -103,11 +118,11 @@ def distances_along(decoder: Decoder, axes: Floats) -> Floats:
     return found
 
 
-def matrix_along(matrix: Floats, axes: Floats) -> Floats:
+def matrix_along(matrix: Floats, vertices: NDArray[np.integer], axes: Floats) -> Floats:
     """The same from a matrix (V, n²) float32 that was not compressed."""
     found = np.empty(axes.shape[:2], np.float32)
-    rows = np.ascontiguousarray(axes, dtype=np.float32)
-    _look_up(matrix, round(matrix.shape[1] ** 0.5), rows, found)
+    ways = np.ascontiguousarray(axes, dtype=np.float32)
+    _look_up(matrix, vertices.astype(np.int64), round(matrix.shape[1] ** 0.5), ways, found)
     return found
 
 
@@ -120,7 +135,8 @@ def _taps(
 ) -> None:
     """`octahedral.taps` of one direction."""
     x, y, z = axis[0], axis[1], axis[2]
-    scale = np.float32(1.0) / (abs(x) + abs(y) + abs(z))
+    # An axis of zeros, which asks for nothing, gets some texel.
+    scale = np.float32(1.0) / max(abs(x) + abs(y) + abs(z), np.float32(1e-30))
     u, v = x * scale, y * scale
     if z < 0.0:
         u, v = (
@@ -129,7 +145,7 @@ def _taps(
         )
     column = (u + np.float32(1.0)) * np.float32(0.5 * n) - np.float32(0.5)
     row = (v + np.float32(1.0)) * np.float32(0.5 * n) - np.float32(0.5)
-    left, top = int(math.floor(column)), int(math.floor(row))
+    left, top = math.floor(column), math.floor(row)
     right, down = column - np.float32(left), row - np.float32(top)
     for k in range(4):
         r, c = top + (k >> 1), left + (k & 1)
@@ -173,12 +189,14 @@ def _decode(
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def _look_up(matrix: Floats, n: int, axes: Floats, found: Floats) -> None:
+def _look_up(
+    matrix: Floats, vertices: NDArray[np.int64], n: int, axes: Floats, found: Floats
+) -> None:
     for vertex in prange(len(axes)):
         texels, shares = np.empty(4, np.int64), np.empty(4, np.float32)
         for lobe in range(axes.shape[1]):
             _taps(n, axes[vertex, lobe], texels, shares)
             distance = np.float32(0.0)
             for tap in range(4):
-                distance += shares[tap] * matrix[vertex, texels[tap]]
+                distance += shares[tap] * matrix[vertices[vertex], texels[tap]]
             found[vertex, lobe] = distance

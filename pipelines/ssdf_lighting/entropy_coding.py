@@ -1,9 +1,9 @@
 """Whole numbers to bytes and back: an adaptive binary range coder.
 
-A number is cut into yes-no questions: is it 0, is it negative, is its size more than 1, more
-than 2 and so on; sizes of 15 and more end in an Exp-Golomb code. Every question has a chance of its own in
-each *context*, a number that the caller gives with each value and that the decoder knows before it
-(how large values of this row are likely to be, say). Chances adapt to what has come, at two
+A number is cut into yes-no questions: is it 0, is it negative, is its size more than 1, more than
+2 and so on; sizes of 15 and more end in an Exp-Golomb code. Every question has a chance of its own
+in each *context*, a number that the caller gives with each value and that the decoder knows before
+it (how large values of this row are likely to be, say). Chances adapt to what has come, at two
 speeds, so nothing but the code itself is stored. Carries are resolved as in Martin, "Range
 encoding", 1979. All arithmetic is in whole numbers: every machine makes the same bytes.
 """
@@ -183,9 +183,7 @@ def _next(state: NDArray[np.int64], code: NDArray[np.uint8]) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _told(
-    state: NDArray[np.int64], code: NDArray[np.uint8], pair: NDArray[np.int32]
-) -> int:
+def _told(state: NDArray[np.int64], code: NDArray[np.uint8], pair: NDArray[np.int32]) -> int:
     bit = _get(state, code, _chance(pair))
     _learn(pair, bit)
     return bit

@@ -121,7 +121,7 @@ def fit_lights(
     lights = Lights(
         blobs.axes, sharpness, _with_flux(target, blobs, integral(sharpness), _fluxes(map_))
     )
-    fit = _judged(lights, map_)
+    fit = judged(lights, map_)
     progress(1.0)
     return fit._replace(lights=lights._replace(amplitudes=lights.amplitudes * level))
 
@@ -353,8 +353,9 @@ def _normal_equations(
 # ---- how good it is --------------------------------------------------------------------------
 
 
-def _judged(lights: Lights, map_: FloatArray) -> Fit:
-    """The errors of lights, against a map of the same scale."""
+def judged(lights: Lights, radiance: NDArray[np.floating]) -> Fit:
+    """The errors of lights against a map (H, 2 H, 3), averaged down to 64 rows."""
+    map_ = averaged(radiance, _HEIGHT)
     height = len(map_)
     ways, true = texel_directions(height).reshape(-1, 3), map_.reshape(-1, 3)
     omega = np.repeat(solid_angles(height), 2 * height)
@@ -368,6 +369,13 @@ def _judged(lights: Lights, map_: FloatArray) -> Fit:
         _relative(np.log1p(found / mean), np.log1p(true / mean), omega),
         _relative(falling @ found, falling @ true, np.repeat(solid_angles(_NORMALS), 2 * _NORMALS)),
     )
+
+
+def flux_error(lights: Lights, radiance: NDArray[np.floating]) -> float:
+    """Largest relative error, over the channels, of the integral of the lights' radiance."""
+    wanted = _fluxes(radiance.astype(np.float64))
+    found = integral(lights.sharpness) @ lights.amplitudes
+    return float((np.abs(found - wanted) / np.maximum(wanted, _TINY)).max())
 
 
 def _relative(found: FloatArray, true: FloatArray, omega: FloatArray) -> float:

@@ -3,7 +3,8 @@
 A frame: the axes of all lobes at the vertices follow from normals, view and lights; the caller
 says how far the edge of the visible sky is there; these distances become vertex attributes, four
 in a vector, and are interpolated. A pixel makes its own lobes of the interpolated normal and its
-view, and takes their visible shares (``shading.shaded``; the table as a formula, :mod:`.edge_share`).
+view, and takes their visible shares (as ``shading.shaded``; the table as a formula,
+:mod:`.edge_share`).
 
 Nothing is built anew for a frame: distances are written into the arrays of the mesh, lights and
 the eye are uniforms (whose values, other than their names, VTK changes without a new shader: seen).

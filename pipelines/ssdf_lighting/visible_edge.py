@@ -35,9 +35,12 @@ class DelaunaySides(NamedTuple):
 
 
 class VisibleEdge(NamedTuple):
-    """Edges of visibility of P points. ``crossings`` (M, 3) float32 unit vectors; ``arcs`` (M, 2)
-    int32, from crossing to crossing, each of which begins one arc and ends one; both point by point, those of point p from ``starts[p]`` to
-    ``starts[p + 1]``, (P + 1,) int64: there are as many arcs as crossings."""
+    """Edges of visibility of P points.
+
+    crossings: (M, 3) float32 unit vectors; arcs: (M, 2) int32, from crossing to crossing, each of
+    which begins one arc and ends one. Both go point by point, those of point p from ``starts[p]``
+    to ``starts[p + 1]``; starts: (P + 1,) int64.
+    """
 
     crossings: NDArray[np.float32]
     arcs: NDArray[np.int32]
@@ -80,9 +83,7 @@ def visible_edge(
 
 
 @njit(cache=True, nogil=True)
-def _count_crossings(
-    visible: NDArray[np.bool_], ends: NDArray[np.int32]
-) -> NDArray[np.int64]:
+def _count_crossings(visible: NDArray[np.bool_], ends: NDArray[np.int32]) -> NDArray[np.int64]:
     starts = np.zeros(len(visible) + 1, np.int64)
     for p in range(len(visible)):
         count = 0

@@ -1,0 +1,160 @@
+"""Scenes to be lit: objects on a floor that are built in, and what a user's mesh becomes.
+
+A scene is brought to a size of its own: its middle is the origin and the sphere around its box has
+radius 1, so that a mesh in millimetres or a kilometre wide, or far from its origin, keeps all its
+digits in single precision. z is up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipelines import geometry
+from pipelines.mesh_repair import repair
+from pipelines.ssdf_lighting.microfacets import Materials
+
+FloatArray = NDArray[np.float64]
+
+SCENES = ("teapot", "court")
+
+
+class Scene(NamedTuple):
+    """Surfaces with normals, and what they are made of.
+
+    vertices: (V, 3) float64, each position once. triangles: (F, 3) int32, counter-clockwise from
+    outside. normals: (V, 3) float64, unit. part: (F,) int32, row of ``materials``.
+    middle: (3,), scale: the given position of a vertex is ``vertex * scale + middle``.
+    notes: what was repaired, one sentence each.
+    """
+
+    vertices: FloatArray
+    triangles: NDArray[np.int32]
+    normals: FloatArray
+    part: NDArray[np.int32]
+    materials: Materials
+    middle: FloatArray
+    scale: float
+    notes: tuple[str, ...]
+
+
+class Drawn(NamedTuple):
+    """A scene to be drawn: vertices are doubled where parts meet. ``source`` (V',) int64, the
+    scene's vertex of each; ``triangles`` (F, 3) int32; ``part`` (V',) int32."""
+
+    source: NDArray[np.int64]
+    triangles: NDArray[np.int32]
+    part: NDArray[np.int32]
+
+
+def make_scene(
+    vertices: ArrayLike, triangles: ArrayLike, part: ArrayLike, materials: Materials
+) -> Scene:
+    """Repair, centre and scale a mesh (see `mesh_repair.repair`).
+
+    vertices (V, 3); triangles (F, 3) and part (F,) integers. Raises ValueError for what is no mesh.
+    """
+    points = np.array(vertices, np.float64)
+    corners = np.asarray(triangles)
+    geometry.check_arrays(points, corners)
+    used = points[np.unique(corners)]
+    middle = (used.min(axis=0) + used.max(axis=0)) / 2.0
+    scale = float(np.linalg.norm(used - middle, axis=1).max())
+    if not scale > 0.0:
+        raise ValueError("all vertices are at one position; expected a mesh of some size.")
+    mended = repair((points - middle) / scale, corners)
+    return Scene(
+        mended.vertices,
+        mended.triangles,
+        geometry.vertex_normals(mended.vertices, mended.triangles),
+        np.asarray(part, np.int32)[mended.kept],
+        materials,
+        middle,
+        scale,
+        mended.notes,
+    )
+
+
+def built_in_scene(name: str, segments: int, floor: int) -> Scene:
+    """``teapot``, glossy, on a floor, as in the paper's figure 1; or ``court``: walls that touch,
+    with a slit between two of them, a thin screen, a post and a ball.
+
+    ``segments`` of a patch's edge (in the teapot of 20: 12 881 vertices), and ``floor`` squares
+    along the floor's side (64: 4225 vertices). Raises ValueError for another name.
+    """
+    if name == "teapot":
+        pot = geometry.teapot(segments)
+        low = pot.vertices[:, 2].min()
+        ground = _floor(floor, 5.0, low)
+        materials = Materials(
+            np.array([[0.72, 0.42, 0.28], [0.6, 0.6, 0.58]]), np.array([0.04, 0.0]), np.full(2, 0.2)
+        )
+        return _joined([(pot.vertices, pot.triangles), ground], materials)
+    if name == "court":
+        n = max(2, segments // 2)
+        ball = geometry.sphere(2 * n)
+        walls = [
+            _box((-1.2, -0.8, 0.0), (-1.1, 0.06, 1.0), n),
+            _box((-1.2, 0.1, 0.0), (-1.1, 0.9, 1.0), n),
+            _box((-1.1, 0.8, 0.0), (0.5, 0.9, 0.7), n),
+            _box((0.9, -0.9, 0.0), (0.93, 0.3, 0.6), n),
+            _box((-0.15, -0.95, 0.0), (0.0, -0.8, 1.3), n),
+        ]
+        joined = _together(walls)
+        materials = Materials(
+            np.array([[0.6, 0.6, 0.58], [0.65, 0.55, 0.42], [0.35, 0.5, 0.68]]),
+            np.array([0.0, 0.0, 0.06]),
+            np.array([0.3, 0.3, 0.15]),
+        )
+        round_one = (ball.vertices * 0.35 + [0.2, 0.1, 0.35], ball.triangles)
+        return _joined([_floor(floor, 4.0, 0.0), joined, round_one], materials)
+    raise ValueError(f"scene is {name!r}; expected one of {', '.join(SCENES)}.")
+
+
+def split_by_part(scene: Scene) -> Drawn:
+    """Vertices as they are drawn, of one material each."""
+    keys = scene.triangles.astype(np.int64) * len(scene.materials.albedo) + scene.part[:, None]
+    found, number = np.unique(keys, return_inverse=True)
+    count = len(scene.materials.albedo)
+    return Drawn(
+        found // count,
+        number.reshape(scene.triangles.shape).astype(np.int32),
+        (found % count).astype(np.int32),
+    )
+
+
+_Mesh = tuple[FloatArray, NDArray[np.int32]]
+
+
+def _joined(meshes: Sequence[_Mesh], materials: Materials) -> Scene:
+    vertices, triangles = _together(meshes)
+    part = np.repeat(np.arange(len(meshes)), [len(mesh[1]) for mesh in meshes])
+    return make_scene(vertices, triangles, part, materials)
+
+
+def _together(meshes: Sequence[_Mesh]) -> _Mesh:
+    starts = np.cumsum([0, *(len(mesh[0]) for mesh in meshes)])[:-1]
+    triangles = [mesh[1] + start for mesh, start in zip(meshes, starts, strict=True)]
+    return np.concatenate([mesh[0] for mesh in meshes]), np.concatenate(triangles).astype(np.int32)
+
+
+def _floor(segments: int, size: float, height: float) -> _Mesh:
+    flat = geometry.square(segments)
+    return flat.vertices * [size, size, 0.0] + [0.0, 0.0, height], flat.triangles
+
+
+def _box(low: Sequence[float], high: Sequence[float], segments: int) -> _Mesh:
+    """A closed box, each face ``segments`` x ``segments`` pairs of triangles."""
+    face = geometry.square(segments)
+    unit = face.vertices + np.array([0.0, 0.0, 0.5])
+    turns = [
+        np.eye(3),
+        np.diag([1.0, -1.0, -1.0]),
+        *(np.roll(np.diag([1.0, s, s]), k, axis=0) for s in (1.0, -1.0) for k in (1, 2)),
+    ]
+    sides = [(unit @ turn.T, face.triangles) for turn in turns]
+    corners, triangles = _together(sides)
+    return (corners + 0.5) * (np.array(high) - low) + low, triangles
