@@ -35,8 +35,8 @@ class LightSettings(Settings):
     lights: int = Field(16, ge=1, le=24, description="Spherical Gaussians of an environment, N")
     least_sharpness: float = Field(3.0, gt=0.0, le=100.0, description="Least λ of a light")
     most_sharpness: float = Field(300.0, ge=100.0, le=1e4, description="Largest λ of a light")
-    sun_azimuth: float = Field(-55.0, ge=-360.0, le=360.0, description="Sky: the sun's, degrees")
-    sun_elevation: float = Field(42.0, ge=5.0, le=85.0, description="Sky: the sun's, degrees")
+    sun_azimuth: float = Field(25.0, ge=-360.0, le=360.0, description="Sky: the sun's, degrees")
+    sun_elevation: float = Field(35.0, ge=5.0, le=85.0, description="Sky: the sun's, degrees")
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"lights": 6},
     }

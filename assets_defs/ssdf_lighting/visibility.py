@@ -115,23 +115,41 @@ def visibility(
 
     from pipelines.raycasting import build_scene
     from pipelines.ssdf_lighting.octahedral import resolution_of, solid_angles, texel_directions
-    from pipelines.ssdf_lighting.visibility import RayOrigins, ray_origins, visible_directions
+    from pipelines.ssdf_lighting.visibility import (
+        RayOrigins,
+        ray_origins,
+        stand_ins,
+        visible_directions,
+    )
 
     scene = scene_of(scene_mesh)
     n = resolution_of(settings.directions)
     rays = build_scene(scene.vertices, scene.triangles)
     origins = ray_origins(rays, scene.vertices, scene.triangles, scene.normals)
     bits = np.empty((len(scene.vertices), (n * n + 7) // 8), np.uint8)
+    share = np.empty(len(bits))
     for first in range(0, len(bits), _BLOCK):
         block = slice(first, first + _BLOCK)
         some = RayOrigins(origins.points[block], origins.sealed[block])
-        bits[block] = np.packbits(visible_directions(rays, some, texel_directions(n)), axis=1)
+        seen = visible_directions(rays, some, texel_directions(n))
+        bits[block], share[block] = np.packbits(seen, axis=1), seen.mean(axis=1)
         progress(first / len(bits))
+    # What is stored for a buried vertex is what another one sees: origin and all.
+    stored = stand_ins(
+        rays,
+        scene.vertices,
+        scene.triangles,
+        scene.normals,
+        origins,
+        share,
+        texel_directions(n),
+    )
     dataset = xr.Dataset(
         {
-            "visible": (("vertex", "byte"), bits),
-            "origin": (("vertex", "axis"), origins.points),
-            "sealed": (("vertex",), origins.sealed),
+            "visible": (("vertex", "byte"), bits[stored]),
+            "origin": (("vertex", "axis"), origins.points[stored]),
+            "sealed": (("vertex",), origins.sealed[stored]),
+            "stored": (("vertex",), stored.astype(np.int32)),
             "direction": (("direction", "axis"), texel_directions(n)),
             "solid_angle": (("direction",), solid_angles(n)),
         }
@@ -139,6 +157,7 @@ def visibility(
     return dataset, {
         "rays": len(bits) * n * n,
         "sealed vertices": int(origins.sealed.sum()),
+        "buried vertices": int((stored != np.arange(len(stored))).sum()),
     }
 
 

@@ -278,7 +278,7 @@ def _largest(
                 break
         else:
             high = number
-        guess = number * limit / max(found, 1e-300)
+        guess = number * (1.0 + _NEAR) / 2.0 * limit / max(found, 1e-300)
         if not low < guess < high:
             guess = np.sqrt(max(low, high / 16.0) * min(high, low * 16.0)) if low else high / 4.0
         number = float(guess)

@@ -52,7 +52,7 @@ def visibility_error(
             turned = np.cross(to, first)
             t = turned @ directions[w] / scale
             distance = np.einsum("fi,fi->f", second, turned) / scale
-        inside = np.minimum(np.minimum(u, t), 1.0 - u - t)
+            inside = np.minimum(np.minimum(u, t), 1.0 - u - t)
         ahead = (distance > 0) & np.isfinite(inside)
         hit = bool(np.any(ahead & (inside > 1e-6))) or bool(sealed[v])
         maybe = bool(np.any(ahead & (inside > -1e-6)))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.raycasting import occluded
+from pipelines.raycasting import first_hits, occluded
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene
@@ -24,6 +24,8 @@ LIFT = 1e-4
 """Height of the rays' origins, in mean lengths of the edges at the vertex."""
 _LEAST_LIFT = 3e-6
 """In extents of the scene, whose positions are single precision: some fifty of their steps."""
+_LITTLE_SKY = 0.05
+"""Share of the directions up to which a vertex may be buried."""
 
 
 class RayOrigins(NamedTuple):
@@ -79,14 +81,73 @@ def visible_directions(
     return ~blocked.reshape(count, -1) & ~origins.sealed[:, None]
 
 
-def _lifts(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
-    edges = np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, -1, axis=1)], axis=2)
+def stand_ins(
+    scene: RaycastingScene,
+    vertices: FloatArray,
+    triangles: NDArray[np.integer],
+    normals: FloatArray,
+    origins: RayOrigins,
+    visible_share: FloatArray,
+    directions: FloatArray,
+) -> NDArray[np.int64]:
+    """For each vertex the one whose visibility is stored for it: itself, but for the *buried* ones.
+
+    Where objects stand on each other or run into each other, some vertices lie inside or in the
+    gap. Nobody sees them, but triangles reach from them into the open, and distances are
+    interpolated there: black at the buried end would spread a whole triangle far. They take what
+    the nearest vertex along the surface has. Buried is a vertex that is sealed, or sees next to no
+    sky and either mostly looks at surfaces from behind, so that it is inside something, or has
+    something straight above it, nearer than the length of its edges.
+
+    visible_share: (V,) of ``directions`` (D, 3).
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
+
+    dark = np.flatnonzero(visible_share < _LITTLE_SKY)
+    buried = origins.sealed.copy()
+    some = directions[:: max(1, len(directions) // 64)]
+    for vertex in dark:
+        upper = some[some @ normals[vertex] > 0.0]
+        met = first_hits(scene, origins.points[vertex], upper).triangle
+        a, b, c = vertices[triangles[met[met >= 0]]].transpose(1, 0, 2)
+        from_behind = np.einsum("ki,ki->k", np.cross(b - a, c - a), upper[met >= 0]) > 0.0
+        buried[vertex] |= int(from_behind.sum()) * 2 > len(upper)
+    sees_none = np.flatnonzero(visible_share == 0.0)
+    above = first_hits(scene, origins.points[sees_none], normals[sees_none]).distance
+    buried[sees_none[above < _mean_edges(vertices, triangles)[sees_none]]] = True
+    number = np.arange(len(vertices))
+    if not buried.any() or buried.all():
+        return number
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    lengths = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
+    size = (len(vertices), len(vertices))
+    # Of a side that two triangles have, both lengths would be summed.
+    sides, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
+    graph = coo_array((lengths[first], (sides[:, 0], sides[:, 1])), shape=size).tocsr()
+    far, _, nearest = dijkstra(
+        graph,
+        directed=False,
+        indices=np.flatnonzero(~buried),
+        min_only=True,
+        return_predecessors=True,
+    )
+    return np.where(buried & np.isfinite(far), nearest, number)
+
+
+def _mean_edges(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
+    following = np.roll(triangles, -1, axis=1)
+    edges = np.linalg.norm(vertices[triangles] - vertices[following], axis=2)
     sums, counts = np.zeros(len(vertices)), np.zeros(len(vertices))
-    for corner in (triangles, np.roll(triangles, -1, axis=1)):
+    for corner in (triangles, following):
         np.add.at(sums, corner, edges)
         np.add.at(counts, corner, 1.0)
+    return sums / np.maximum(counts, 1.0)
+
+
+def _lifts(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
     extent = np.linalg.norm(np.ptp(vertices, axis=0))
-    lifts: FloatArray = np.maximum(LIFT * sums / np.maximum(counts, 1.0), _LEAST_LIFT * extent)
+    lifts: FloatArray = np.maximum(LIFT * _mean_edges(vertices, triangles), _LEAST_LIFT * extent)
     return lifts
 
 

@@ -46,6 +46,12 @@ VISIBILITY = Schema(
         "sealed": Variable(
             ("vertex",), "bool", "1", "Whether other surfaces cover the vertex on all sides"
         ),
+        "stored": Variable(
+            ("vertex",),
+            "int32",
+            "1",
+            "Vertex whose visibility is stored: itself, or the nearest one that is not buried",
+        ),
         "direction": Variable(
             ("direction", "axis"), "float64", "1", "Unit vectors; the octahedral map's texels"
         ),
