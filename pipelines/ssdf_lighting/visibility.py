@@ -26,6 +26,8 @@ _LEAST_LIFT = 3e-6
 """In extents of the scene, whose positions are single precision: some fifty of their steps."""
 _LITTLE_SKY = 0.05
 """Share of the directions up to which a vertex may be buried."""
+_ENOUGH = 256
+"""Rays from a vertex that tell whether it is buried."""
 
 
 class RayOrigins(NamedTuple):
@@ -106,7 +108,7 @@ def stand_ins(
 
     dark = np.flatnonzero(visible_share < _LITTLE_SKY)
     buried = origins.sealed.copy()
-    some = directions[:: max(1, len(directions) // 64)]
+    some = np.random.default_rng(0).permutation(directions)[:_ENOUGH]
     for vertex in dark:
         upper = some[some @ normals[vertex] > 0.0]
         met = first_hits(scene, origins.points[vertex], upper).triangle
