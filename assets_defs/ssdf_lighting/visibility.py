@@ -233,12 +233,13 @@ def ssdf_matrix(
     import xarray as xr
 
     from pipelines.raycasting import build_scene
-    from pipelines.ssdf_lighting.distances import distances_to_arcs, distances_to_samples
-    from pipelines.ssdf_lighting.visible_edge import visible_edge
+    from pipelines.ssdf_lighting.distances import distances_to_samples
+    from pipelines.ssdf_lighting.refined import refined_distances
+    from pipelines.ssdf_lighting.visibility import RayOrigins
 
     scene = scene_of(scene_mesh)
     rays = build_scene(scene.vertices, scene.triangles)
-    origins = visibility["origin"].values
+    origins, sealed = visibility["origin"].values, visibility["sealed"].values
     count, directions = len(scene.vertices), visibility.sizes["direction"]
     done, lock = [0], threading.Lock()
 
@@ -248,7 +249,7 @@ def ssdf_matrix(
         if settings.edges == "samples":
             distances = distances_to_samples(seen)
         else:
-            distances = distances_to_arcs(seen, visible_edge(rays, origins[block], seen))
+            distances = refined_distances(rays, RayOrigins(origins[block], sealed[block]), seen)
         with lock:
             done[0] += len(seen)
             progress(done[0] / count)

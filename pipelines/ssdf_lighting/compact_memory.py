@@ -1,10 +1,10 @@
 """The compact codes in memory: any vertex is decoded from one read of its own few bytes.
 
-Whole numbers of 4, 8 or 16 bits, as many as a column's largest needs; no entropy coder. A row of
-bytes holds a row's 16-bit numbers, then its 8-bit ones, then its 4-bit ones, two a byte, the first
-in the lower half; columns keep their order within a width. The weights of a vertex are a row of
-its cluster, clusters' vectors are rows over the shared basis, and the shared basis has a row a
-direction, no longer cosine transformed.
+Whole numbers of 4, 8, 16 or 32 bits, as many as a column's largest needs; no entropy coder. A row
+of bytes holds a row's 32-bit numbers, then its 16-bit ones, its 8-bit ones, then its 4-bit ones,
+two a byte, the first in the lower half; columns keep their order within a width. The weights of a
+vertex are a row of its cluster, clusters' vectors are rows over the shared basis, and the shared
+basis has a row a direction, no longer cosine transformed.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ from pipelines.ssdf_lighting.compact import (
 from pipelines.ssdf_lighting.weighted_sphere import root_weights
 
 Bytes = NDArray[np.uint8]
+
+_WHOLE = {32: "<i4", 16: "<i2", 8: "i1"}
+"""Bits of numbers of whole bytes, in the order of a row."""
 
 
 class Packed(NamedTuple):
@@ -98,16 +101,12 @@ def packed(compact: Compact) -> Packed:
 
 
 def widths(codes: Codes) -> Bytes:
-    """Bits (columns,) uint8, 4, 8 or 16, that the columns of codes (rows, columns) need.
-
-    Raises ValueError for codes beyond 16 bits.
-    """
+    """Bits (columns,) uint8, 4, 8, 16 or 32, that the columns of codes (rows, columns) need."""
     low, high = codes.min(axis=0, initial=0), codes.max(axis=0, initial=0)
     needed = np.maximum(high, -1 - low)
-    if needed.max(initial=0) >= 1 << 15:
-        raise ValueError(f"codes reach {needed.max()}; expected sizes below {1 << 15}.")
-    bits = np.where(needed < 8, 4, np.where(needed < 128, 8, 16))
-    return bits.astype(np.uint8)
+    return np.select([needed < 1 << 3, needed < 1 << 7, needed < 1 << 15], [4, 8, 16], 32).astype(
+        np.uint8
+    )
 
 
 def row_bytes(bits: Bytes) -> int:
@@ -117,21 +116,25 @@ def row_bytes(bits: Bytes) -> int:
 
 def pack_rows(codes: Codes, bits: Bytes) -> Bytes:
     """Rows of bytes (rows, bytes) of codes (rows, columns)."""
-    wide = np.ascontiguousarray(codes[:, bits == 16].astype("<i2")).view(np.uint8)
-    middle = np.ascontiguousarray(codes[:, bits == 8].astype(np.int8)).view(np.uint8)
+    whole = [
+        np.ascontiguousarray(codes[:, bits == width].astype(kind)).view(np.uint8)
+        for width, kind in _WHOLE.items()
+    ]
     narrow = (codes[:, bits == 4] & 15).astype(np.uint8)
     narrow = np.pad(narrow, ((0, 0), (0, narrow.shape[1] % 2)))
     pairs = narrow[:, 0::2] | (narrow[:, 1::2] << 4)
-    return np.concatenate([wide.reshape(len(codes), -1), middle, pairs], axis=1)
+    return np.concatenate([*(part.reshape(len(codes), -1) for part in whole), pairs], axis=1)
 
 
 def unpack_rows(rows: Bytes, bits: Bytes) -> Codes:
     """Codes (rows, columns) int32 of rows of bytes."""
-    wide, middle = int((bits == 16).sum()), int((bits == 8).sum())
     codes = np.empty((len(rows), len(bits)), np.int32)
-    codes[:, bits == 16] = np.ascontiguousarray(rows[:, : 2 * wide]).view("<i2")
-    codes[:, bits == 8] = rows[:, 2 * wide : 2 * wide + middle].view(np.int8)
-    pairs = rows[:, 2 * wide + middle :]
+    start = 0
+    for width, kind in _WHOLE.items():
+        end = start + int((bits == width).sum()) * width // 8
+        codes[:, bits == width] = np.ascontiguousarray(rows[:, start:end]).view(kind)
+        start = end
+    pairs = rows[:, start:]
     narrow = np.stack([pairs & 15, pairs >> 4], axis=-1).reshape(len(rows), -1).astype(np.int32)
     codes[:, bits == 4] = (narrow[:, : int((bits == 4).sum())] ^ 8) - 8
     return codes

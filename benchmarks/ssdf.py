@@ -1,0 +1,384 @@
+"""Figures of SSDF lighting: the paper's table, bytes at equal error, speed, and pictures.
+
+The default scale makes the default scene once, twice and four times as fine; ``--scale paper``
+sixteen times, too. docs/ssdf.md says what each figure means.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from assets_defs.ssdf_lighting import SSDF
+from assets_defs.ssdf_lighting.compression import (
+    distance_blocks,
+    shared_basis_of,
+)
+from assets_defs.ssdf_lighting.meshes import scene_of
+from assets_defs.ssdf_lighting.visibility import unpacked
+from assets_defs.workspace import CHECKOUT, Workspace
+from benchmarks.ssdf_precompute import SCENE
+from pipelines.ssdf_lighting import compact as coding
+from pipelines.ssdf_lighting.clustered_pca import ClusteredPca, clustered_pca, decoder_of_pca
+from pipelines.ssdf_lighting.compact_file import to_bytes
+from pipelines.ssdf_lighting.compact_memory import packed
+from pipelines.ssdf_lighting.decoding import decoded_rows, decoder_of
+from pipelines.ssdf_lighting.distances import distances_to_samples
+from pipelines.ssdf_lighting.figures import compression_error
+from pipelines.ssdf_lighting.octahedral import solid_angles, texel_directions
+from pipelines.ssdf_lighting.refined import refined_distances
+from pipelines.ssdf_lighting.triangle_clusters import clusters_by_distance, clusters_by_position
+from pipelines.ssdf_lighting.visibility import RayOrigins, visible_directions
+from pipelines.ssdf_lighting.weighted_sphere import root_weights
+
+PAPER_CLUSTERS, PAPER_VALUES, PAPER_CONTRIBUTION = 64, 48, 0.9
+PAPER_ERRORS = {"error_48": 0.312758, "error_90": 1.4008}
+PAPER_MB = {"raw": 266.0, "48": 66.4, "90": 22.2}
+"""The paper's table, MB of 2^20 bytes."""
+FACTORS = {"default": (1, 2, 4), "paper": (1, 2, 4, 16)}
+SINGLE_FACTORS = {"default": (1, 4), "paper": (1, 4, 16)}
+CURVE_VALUES = (4, 8, 16, 32, 48, 64, 96)
+CURVE_CLUSTERS = (1, 4, 16, 64, 256)
+CURVE_STEPS = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
+NAIVE_VERTICES, FINE_VERTICES, FINE = 500, 120, 384
+
+
+def run(scale: str) -> dict[str, Any]:
+    """All figures."""
+    figures: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        made = {
+            factor: _precomputed(Path(folder) / f"{factor}x", factor) for factor in FACTORS[scale]
+        }
+        figures |= _precompute_figures(made)
+        store = Workspace(Path(folder) / "1x").store
+
+        def stored(asset: str) -> xr.Dataset:
+            return store.open(SSDF.slot(asset, {"scene": SCENE}))
+
+        matrix = stored("ssdf_matrix")["distances"].values
+        for part in (_tables, _compact, _curve):
+            _timed(figures, part.__name__, lambda part=part: part(stored, matrix, figures))
+        np.save(Path(folder) / "matrix.npy", matrix)
+        _timed(figures, "codecs", lambda: _codecs(Path(folder) / "matrix.npy", figures))
+        _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
+        _timed(figures, "edges", lambda: _edges(stored))
+        from benchmarks.ssdf_pictures import picture_figures
+
+        _timed(figures, "pictures", lambda: picture_figures(stored))
+    return figures
+
+
+def _timed(figures: dict[str, Any], name: str, part: Callable[[], dict[str, Any]]) -> None:
+    start = time.perf_counter()
+    figures |= part()
+    print(f"{name.strip('_')}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+
+
+# ---- making it -------------------------------------------------------------------------------
+
+
+def _precomputed(folder: Path, factor: int) -> dict[str, Any]:
+    command = [sys.executable, "-m", "benchmarks.ssdf_precompute", str(folder), str(factor)]
+    done = subprocess.run(command, cwd=CHECKOUT, check=True, stdout=subprocess.PIPE, text=True)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    print(f"{factor}x: {found['total_seconds']:.0f} s", file=sys.stderr, flush=True)
+    return found
+
+
+def _precompute_figures(made: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    slope = np.polyfit(
+        [np.log(one["vertices"]) for one in made.values()],
+        [np.log(one["total_seconds"]) for one in made.values()],
+        1,
+    )[0]
+    return {
+        "vertices": made[1]["vertices"],
+        "precompute_s": made[1]["total_seconds"],
+        "precompute_steps": {str(factor): one["seconds"] for factor, one in made.items()},
+        "peak_rss_mb": made[1]["peak_rss_mb"],
+        "peak_rss_mb_all": {str(factor): one["peak_rss_mb"] for factor, one in made.items()},
+        "growth_exponent": float(slope),
+    }
+
+
+# ---- bytes and error -------------------------------------------------------------------------
+
+
+def _rmse(matrix: NDArray[np.float32], decode: Callable[..., NDArray[np.float32]]) -> float:
+    squares, weights = 0.0, root_weights(matrix.shape[1])
+    for first in range(0, len(matrix), 1024):
+        rows = np.arange(first, min(first + 1024, len(matrix)))
+        off = (decode(rows) - matrix[rows]) * weights
+        squares += float((off.astype(np.float64) ** 2).sum())
+    return (squares / matrix.size) ** 0.5
+
+
+def _tables(
+    stored: Callable[[str], xr.Dataset], matrix: NDArray[np.float32], figures: dict[str, Any]
+) -> dict[str, Any]:
+    """The paper's table, on refined distances and on those to the samples."""
+    mesh = stored("scene_mesh")
+    triangles = mesh["triangles"].values
+    clusters = clusters_by_position(mesh["vertices"].values, triangles, PAPER_CLUSTERS, 0).triangle
+    found: dict[str, Any] = {
+        "raw_bytes": matrix.nbytes,
+        "paper_mb": PAPER_MB,
+        "paper_errors": PAPER_ERRORS,
+    }
+    seen = stored("visibility")
+    samples = np.concatenate(
+        [
+            distances_to_samples(unpacked(seen.isel(vertex=slice(first, first + 1024))))
+            for first in range(0, len(matrix), 1024)
+        ]
+    )
+    for label, rows in (("", matrix), ("_samples", samples)):
+        for name, values, contribution in (
+            ("48", PAPER_VALUES, None),
+            ("90", None, PAPER_CONTRIBUTION),
+        ):
+            pca = clustered_pca(
+                lambda numbers, rows=rows: rows[numbers],
+                triangles,
+                clusters,
+                values=values,
+                contribution=contribution,
+            )
+            found |= {
+                f"bytes_{name}{label}": pca.nbytes,
+                f"error_{name}{label}": float(pca.relative_error.sum()),
+                f"rmse_{name}{label}": _rmse_of_pca(rows, pca),
+                f"values_{name}{label}": len(pca.vectors) / PAPER_CLUSTERS,
+            }
+    return found
+
+
+def _rmse_of_pca(matrix: NDArray[np.float32], pca: ClusteredPca) -> float:
+    decoder = decoder_of_pca(pca, len(matrix))
+    return _rmse(matrix, lambda rows: decoded_rows(decoder, rows))
+
+
+def _dense(cluster: NDArray[np.integer]) -> NDArray[np.int32]:
+    return np.unique(cluster, return_inverse=True)[1].astype(np.int32)
+
+
+def _compact(
+    stored: Callable[[str], xr.Dataset], matrix: NDArray[np.float32], figures: dict[str, Any]
+) -> dict[str, Any]:
+    """The compact form at the error of the paper's 48 values, and what each idea in it is worth."""
+    basis = shared_basis_of(stored("triangle_clusters"))
+    mesh = stored("scene_mesh")
+    triangles = mesh["triangles"].values
+    target = figures["rmse_48"]
+    cluster = _dense(stored("triangle_clusters")["vertex_cluster"].values)
+    best = coding.searched(basis, cluster, target)
+    file, memory = to_bytes(best), packed(best)
+    decoder = decoder_of(memory)
+    from_file = coding.coordinates(best)
+    vectors = coding.shared_vectors(best) / root_weights(matrix.shape[1])
+    errors = (
+        _rmse(matrix, lambda rows: from_file[rows] @ vectors),
+        _rmse(matrix, lambda rows: decoded_rows(decoder, rows)),
+    )
+    error = compression_error(
+        distance_blocks(stored("ssdf_matrix")),
+        lambda rows: decoded_rows(decoder, rows),
+        mesh["normals"].values,
+    )
+    found: dict[str, Any] = {
+        "file_bytes": len(file),
+        "memory_bytes": memory.nbytes,
+        "runtime_bytes": decoder.table.nbytes + decoder.weights.nbytes,
+        "best_rmse_file": errors[0],
+        "best_rmse_memory": errors[1],
+        "best_rmse_ratio": max(errors) / target,
+        "best_wrong_visibility": error.wrong_visibility,
+        "best_values": len(best.weights) / len(matrix),
+        "file_ratio_48": figures["bytes_48"] / len(file),
+    }
+    # One idea less at a time, at the same error.
+    positions = clusters_by_position(mesh["vertices"].values, triangles, PAPER_CLUSTERS, 0)
+    alike = clusters_by_distance(basis.coordinates, triangles, PAPER_CLUSTERS, 0)
+    for name, labels in (("64_positions", positions.vertex), ("64_distances", alike.vertex)):
+        one = coding.searched(basis, _dense(labels), target)
+        found[f"file_bytes_{name}"] = len(to_bytes(one))
+        found[f"memory_bytes_{name}"] = packed(one).nbytes
+        found[f"values_{name}"] = len(one.weights) / len(matrix)
+    found["file_bytes_8_bit"] = sum(part.size for part in best[1:] if part.ndim)
+    import lzma
+
+    codes = np.concatenate([part.ravel() for part in best[1:]]).astype("<i2").tobytes()
+    found["file_bytes_lzma"] = len(lzma.compress(codes, preset=9))
+    return found
+
+
+def _curve(
+    stored: Callable[[str], xr.Dataset], matrix: NDArray[np.float32], figures: dict[str, Any]
+) -> dict[str, Any]:
+    """Bytes against error: the paper's form for m values, ours for several steps, by clusters."""
+    basis = shared_basis_of(stored("triangle_clusters"))
+    mesh = stored("scene_mesh")
+    triangles, vertices = mesh["triangles"].values, mesh["vertices"].values
+    directions = matrix.shape[1]
+    curve: dict[str, Any] = {}
+    for count in CURVE_CLUSTERS:
+        near = clusters_by_position(vertices, triangles, count, 0).triangle
+        members = [np.unique(triangles[near == number]) for number in range(count)]
+        rows = sum(len(one) for one in members)
+        spectra = [
+            np.linalg.svd(basis.coordinates[one], compute_uv=False).astype(np.float64)
+            for one in members
+        ]
+        lost = basis.lost * rows / len(matrix)
+        paper = []
+        for values in CURVE_VALUES:
+            kept = sum(min(values, len(one)) for one in spectra)
+            used = sum(len(own) * min(values, len(own)) for own in members)
+            squares = lost + sum(float((one[values:] ** 2).sum()) for one in spectra)
+            paper.append(
+                [values, 4 * (kept * directions + used), (squares / (rows * directions)) ** 0.5]
+            )
+        alike = _dense(clusters_by_distance(basis.coordinates, triangles, count, 0).vertex)
+        factors = coding.factorise(basis, alike)
+        ours = []
+        for step in CURVE_STEPS:
+            made = coding.fit(basis, alike, factors, step)
+            error = (coding.squared_error(basis, made) / matrix.size) ** 0.5
+            ours.append([step, len(to_bytes(made)), packed(made).nbytes, error])
+        curve[str(count)] = {"paper": paper, "ours": ours}
+    return {"curve": curve}
+
+
+def _codecs(matrix: Path, figures: dict[str, Any]) -> dict[str, Any]:
+    rmse = max(figures["best_rmse_file"], figures["best_rmse_memory"])
+    command = [sys.executable, "-m", "benchmarks.ssdf_codecs", str(matrix), str(rmse)]
+    done = subprocess.run(command, cwd=CHECKOUT, check=True, stdout=subprocess.PIPE, text=True)
+    sizes = json.loads(done.stdout.splitlines()[-1])
+    return {
+        "codec_bytes": sizes,
+        "codec_bytes_ratio": sizes["zfp"] / figures["memory_bytes"],
+        "jxl_bytes_ratio": sizes["jxl"] / figures["memory_bytes"],
+    }
+
+
+def _single(folder: Path, factors: tuple[int, ...]) -> dict[str, Any]:
+    """One PCA of everything (Wang et al.) against clusters, by size of the mesh.
+
+    Both at the error of the graph's own setting, by the same coder: one cluster against as many
+    as the graph makes.
+    """
+    found: dict[str, Any] = {
+        "single_pca_file_ratio": {},
+        "single_pca_memory_ratio": {},
+        "single_pca_multiplies_ratio": {},
+        "single_pca_values": {},
+        "clusters_values": {},
+    }
+    for factor in factors:
+        store = Workspace(folder / f"{factor}x").store
+        made = store.open(SSDF.slot("triangle_clusters", {"scene": SCENE}))
+        compressed = store.open(SSDF.slot("ssdf_basis", {"scene": SCENE}))
+        basis = shared_basis_of(made)
+        rmse = float(compressed["rmse"])
+        own = coding.searched(basis, _dense(made["vertex_cluster"].values), rmse)
+        one = coding.searched(basis, np.zeros(len(basis.coordinates), np.int32), rmse)
+        count = len(basis.coordinates)
+        values = len(one.weights) / count, len(own.weights) / count
+        label = f"{factor}x"
+        found["single_pca_file_ratio"][label] = len(to_bytes(one)) / len(to_bytes(own))
+        found["single_pca_memory_ratio"][label] = packed(one).nbytes / packed(own).nbytes
+        found["single_pca_multiplies_ratio"][label] = values[0] / values[1]
+        found["single_pca_values"][label], found["clusters_values"][label] = values
+    return found
+
+
+# ---- distances -------------------------------------------------------------------------------
+
+
+def _edges(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
+    """The edge inside a cell against many more directions; speed against all pairs."""
+    from scipy.spatial import cKDTree
+
+    from pipelines.raycasting import build_scene
+
+    scene, seen = scene_of(stored("scene_mesh")), stored("visibility")
+    rays = build_scene(scene.vertices, scene.triangles)
+    random = np.random.default_rng(0)
+    origins = seen["origin"].values
+
+    rows = random.permutation(len(origins))[:NAIVE_VERTICES]
+    visible = unpacked(seen)[rows]
+    halves = np.array_split(np.arange(len(rows)), 2)
+    distances_to_samples(visible[:8])  # compiles
+    start = time.perf_counter()
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda half: distances_to_samples(visible[half]), halves))
+    samples_s = time.perf_counter() - start
+    sealed = seen["sealed"].values
+
+    def refined(of: NDArray[np.int64], visible: NDArray[np.bool_]) -> NDArray[np.float32]:
+        return refined_distances(rays, RayOrigins(origins[of], sealed[of]), visible)
+
+    refined(rows[:8], visible[:8])
+    start = time.perf_counter()
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda half: refined(rows[half], visible[half]), halves))
+    refined_s = time.perf_counter() - start
+    start = time.perf_counter()
+    for one in visible:
+        _all_pairs(one)
+    naive_s = time.perf_counter() - start
+
+    fine = random.permutation(np.flatnonzero(~sealed))[:FINE_VERTICES]
+    visible = unpacked(seen)[fine]
+    n = round(visible.shape[1] ** 0.5)
+    ours = refined(fine, visible)
+    coarse = distances_to_samples(visible)
+    directions, weights = texel_directions(n), solid_angles(n)
+    many = texel_directions(FINE)
+    squares = np.zeros(2)
+    used = 0
+    for row, vertex in enumerate(fine):
+        some = RayOrigins(origins[vertex : vertex + 1], np.zeros(1, bool))
+        there = visible_directions(rays, some, many)[0]
+        if there.all() or not there.any():
+            continue
+        exact = np.where(
+            visible[row],
+            2 * np.arcsin(cKDTree(many[~there]).query(directions)[0] / 2),
+            -2 * np.arcsin(cKDTree(many[there]).query(directions)[0] / 2),
+        )
+        squares += [weights @ (one[row] - exact) ** 2 for one in (ours, coarse)]
+        used += 1
+    errors = np.sqrt(squares / (4 * np.pi * used))
+    return {
+        "distance_vs_naive": samples_s / naive_s,
+        "refined_vs_naive": refined_s / naive_s,
+        "naive_ms": 1000 * naive_s / len(rows),
+        "subcell_error_ratio": float(errors[0] / errors[1]),
+        "subcell_error": float(errors[0]),
+        "sample_error": float(errors[1]),
+    }
+
+
+def _all_pairs(visible: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Distances to samples by one matrix product of all visible and all hidden directions."""
+    directions = texel_directions(round(len(visible) ** 0.5)).astype(np.float32)
+    near = directions[visible] @ directions[~visible].T
+    distances = np.empty(len(visible), np.float32)
+    if near.size:
+        distances[visible] = np.arccos(np.minimum(near.max(axis=1), 1.0))
+        distances[~visible] = -np.arccos(np.minimum(near.max(axis=0), 1.0))
+    return distances
