@@ -249,7 +249,9 @@ def ssdf_matrix(
         if settings.edges == "samples":
             distances = distances_to_samples(seen)
         else:
-            distances = refined_distances(rays, RayOrigins(origins[block], sealed[block]), seen)
+            distances = refined_distances(
+                rays, RayOrigins(origins[block], sealed[block]), scene.normals[block], seen
+            )
         with lock:
             done[0] += len(seen)
             progress(done[0] / count)
