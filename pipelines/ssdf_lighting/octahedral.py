@@ -12,6 +12,7 @@ sphere's centre; so solid angles are exact. Texels differ 5 : 1 in them.
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ class Taps(NamedTuple):
 
 def resolution_of(directions: int) -> int:
     """n of n x n directions. Raises ValueError for a count that is no even n squared, n >= 4."""
-    n = round(directions**0.5)
+    n = math.isqrt(max(directions, 0))
     if n * n != directions or n % 2 or n < 4:
         raise ValueError(
             f"directions is {directions}; expected the square of an even number from 4 on, "
