@@ -27,6 +27,10 @@ NO_EDGE = math.pi
 
 _TILE = 4
 _FAR = 16.0  # squared chords are at most 4
+_STEEP = 3.0  # squared chords from which on the angle is measured from the antipode
+_BETWEEN = np.float32(3e-7)
+"""A direction is taken to lie beside an arc from here on: less is rounding. All that is given up is
+the arc instead of its end, at a difference below this."""
 
 
 class _Tiles(NamedTuple):
@@ -128,6 +132,25 @@ def _candidates(
 
 
 @njit(cache=True, nogil=True, fastmath={"nsz", "contract", "reassoc", "nnan"})
+def _beyond(
+    x: float,
+    y: float,
+    z: float,
+    points: NDArray[np.float32],
+    found: NDArray[np.int32],
+    count: int,
+) -> float:
+    """Angle to the nearest of the found points (M, 3 or more), which are all on the far side:
+    near pi a chord hardly changes with its angle, so the antipodes' angles are measured."""
+    farthest = np.float32(0.0)
+    for number in range(count):
+        k = found[number]
+        sx, sy, sz = x + points[k, 0], y + points[k, 1], z + points[k, 2]
+        farthest = max(farthest, sx * sx + sy * sy + sz * sz)
+    return math.pi - 2.0 * math.asin(min(1.0, 0.5 * math.sqrt(farthest)))
+
+
+@njit(cache=True, nogil=True, fastmath={"nsz", "contract", "reassoc", "nnan"})
 def _to_samples(
     visible: NDArray[np.bool_],
     ends: NDArray[np.int32],
@@ -163,6 +186,7 @@ def _to_samples(
                 if not wanted:
                     continue
                 nearest[:] = np.float32(_FAR)
+                near = 0
                 if others:
                     near = _candidates(
                         middles[tile], 2.0 * radii[tile], split[:others], closeness, found
@@ -178,8 +202,11 @@ def _to_samples(
                     direction = order[first + k]
                     if visible[p, direction] == kind:
                         angle = math.pi
-                        if nearest[k] < _FAR:
-                            angle = 2.0 * math.asin(min(1.0, 0.5 * math.sqrt(nearest[k])))
+                        if nearest[k] < _STEEP:
+                            angle = 2.0 * math.asin(0.5 * math.sqrt(nearest[k]))
+                        elif nearest[k] < _FAR:
+                            x, y, z = ways[0, first + k], ways[1, first + k], ways[2, first + k]
+                            angle = _beyond(x, y, z, split, found, near)
                         distances[p, direction] = angle if kind else -angle
 
 
@@ -231,12 +258,16 @@ def _to_arcs(
                     after = x * bx + y * by + z * bz
                     before = x * ex + y * ey + z * ez
                     dx, dy, dz = x - ax, y - ay, z - az
-                    square = off * off if min(after, before) >= 0 else np.float32(_FAR)
+                    square = off * off if min(after, before) > _BETWEEN else np.float32(_FAR)
                     to_plane[k] = min(to_plane[k], square)
                     to_point[k] = min(to_point[k], dx * dx + dy * dy + dz * dz)
             for k in range(size):
                 direction = order[first + k]
-                angle = 2.0 * math.asin(min(1.0, 0.5 * math.sqrt(to_point[k])))
+                if to_point[k] < _STEEP:
+                    angle = 2.0 * math.asin(0.5 * math.sqrt(to_point[k]))
+                else:
+                    x, y, z = ways[0, first + k], ways[1, first + k], ways[2, first + k]
+                    angle = _beyond(x, y, z, planes, found, near)
                 if to_plane[k] <= 1.0:
                     angle = min(angle, math.asin(math.sqrt(to_plane[k])))
                 distances[p, direction] = angle if visible[p, direction] else -angle

@@ -72,6 +72,8 @@ def turning(
     size: tuple[int, int],
     turns: Sequence[float],
     progress: Progress = lambda fraction: None,
+    *,
+    supersampling: int = 1,
 ) -> Turn:
     """Draw the scene for each turn (degrees about up) of its lights.
 
@@ -87,7 +89,7 @@ def turning(
         lights,
     )
     pictures, seconds = [], []
-    with Stage(*size, background=_BACKGROUND) as stage:
+    with Stage(*size, background=_BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)
         stage.look(camera)
         for number, turn in enumerate(turns):

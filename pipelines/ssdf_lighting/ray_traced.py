@@ -32,7 +32,8 @@ _AT_ONCE = 1 << 17  # samples in memory together
 
 
 class Traced(NamedTuple):
-    """radiance: (H, W, 4) float64, linear, and coverage; standard_error: (H, W, 3) of radiance."""
+    """radiance: (H, W, 4) float64, linear, and coverage; standard_error: (H, W, 3) of radiance, as
+    if samples were independent; they are spread evenly, and it is less."""
 
     radiance: FloatArray
     standard_error: FloatArray
@@ -98,15 +99,24 @@ def ray_traced(
         places = np.repeat(middles[block], samples, axis=0)
         # Each block has numbers of its own: the picture does not depend on the blocks' order.
         rng = np.random.default_rng([seed, first])
+        u = _spread(len(middles[block]), samples, rng)
         if jittered:
-            places += rng.random(places.shape) - 0.5
-        light, hit = _sampled(scene, surface, materials, lights, camera, size, places, rng)
+            places += u[:, 4:] - 0.5
+        light, hit = _sampled(scene, surface, materials, lights, camera, size, places, u[:, :4])
         light = light.reshape(-1, samples, 3)
         picture[block, :3] = light.mean(axis=1)
         picture[block, 3] = hit.reshape(-1, samples).mean(axis=1)
         error[block] = light.std(axis=1, ddof=1) / math.sqrt(samples)
     width, height = size
     return Traced(picture.reshape(height, width, 4), error.reshape(height, width, 3))
+
+
+def _spread(pixels: int, samples: int, rng: np.random.Generator) -> FloatArray:
+    """Numbers (pixels * samples, 6) in [0, 1): in each pixel Sobol's points, moved around."""
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(6, scramble=True, rng=rng).random(1 << (samples - 1).bit_length())[:samples]
+    return ((points + rng.random((pixels, 1, 6))) % 1.0).reshape(-1, 6)
 
 
 def _surface(
@@ -139,9 +149,10 @@ def _sampled(
     camera: Camera,
     size: tuple[int, int],
     places: FloatArray,
-    rng: np.random.Generator,
+    u: FloatArray,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """One sample's light (S, 3) for each place (S, 2) of the picture, and whether it hit."""
+    """One sample's light (S, 3) for each place (S, 2) of the picture, and whether it hit;
+    ``u`` (S, 4) are its numbers in [0, 1)."""
     origins, ways = camera_rays(camera, size, places)
     hits = first_hits(scene, origins, ways)
     hit = hits.triangle >= 0
@@ -159,7 +170,7 @@ def _sampled(
         -ways[hit],
         surface.object_of_triangle[triangle],
     )
-    way, density, glow = _drawn(spots, materials, lights, rng)
+    way, density, glow = _drawn(spots, materials, lights, u[hit])
     reflected = _reflected(spots, materials, way)
     above = (np.sum(way * spots.facing, axis=1) > 0) & (reflected > 0).any(axis=1)
     above[above] = ~occluded(scene, spots.at[above], way[above])
@@ -168,10 +179,9 @@ def _sampled(
 
 
 def _drawn(
-    spots: _Spots, materials: Materials, lights: Lights, rng: np.random.Generator
+    spots: _Spots, materials: Materials, lights: Lights, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Directions (S, 3), their density (S,) per steradian, and the radiance (S, 3) from there."""
-    count = len(spots.row)
     roughness = materials.roughness[spots.row]
     gloss_part = np.where(materials.specular[spots.row] > 0, (1 - _LIGHTS_PART) / 2, 0.0)
     matt_part = 1 - _LIGHTS_PART - gloss_part
@@ -182,7 +192,6 @@ def _drawn(
     chances = facing * (lights.amplitudes.mean(axis=1) * whole + 1e-30)
     chances /= chances.sum(axis=1, keepdims=True)
 
-    u = rng.random((count, 4))
     chosen = np.sum(np.cumsum(chances, axis=1) < u[:, 3:], axis=1)
     chosen = np.minimum(chosen, len(whole) - 1)
     by_light = u[:, 2] < _LIGHTS_PART

@@ -3,7 +3,8 @@
 The Delaunay triangulation of the directions says which are neighbours. Where two neighbours
 differ, the edge of visibility crosses between them; a few more rays find where. A triangle with
 differing corners is crossed on two of its sides: the arc between the crossings is a piece of the
-edge, and all pieces together are closed loops with the visible directions on their right.
+edge, and all pieces together are closed loops; seen from the point, with the visible directions on
+their right.
 """
 
 from __future__ import annotations

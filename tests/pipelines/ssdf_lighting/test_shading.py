@@ -141,8 +141,8 @@ def test_edges_beyond_the_own_horizon_change_nothing_and_no_sky_is_dark() -> Non
 
 
 def by_quadrature(view: Array, light: Array, sharpness: float, roughness: float) -> float:
-    """Gloss of F0 = 0.04 towards ``view`` on a plane, from half the directions the light's, half
-    those of a fine grid: a narrow light with the former, a wide one with the latter."""
+    """Gloss of F0 = 0.04 towards ``view`` on a plane: directions about a narrow light, for a wide
+    one all of them, finer than the lobe."""
     if sharpness > 50:
         ways, weights = around(light, sharpness)
     else:
@@ -162,10 +162,11 @@ def by_quadrature(view: Array, light: Array, sharpness: float, roughness: float)
 
 @pytest.mark.parametrize("roughness", [0.1, 0.25, 0.5])
 @pytest.mark.parametrize(
-    ("sharpness", "most"), [(0.5, 0.06), (5, 0.12), (30, 0.15), (300, 0.12), (1000, 0.05)]
+    ("sharpness", "most"), [(0.5, 0.04), (5, 0.12), (30, 0.12), (300, 0.13), (1000, 0.22)]
 )
 def test_gloss_near_the_mirror_direction(roughness: float, sharpness: float, most: float) -> None:
-    """Against the brightest of 24 directions; the warped SG alone is off by 0.2 to 0.9."""
+    """Root mean square over that of what is expected, down to a view from 78 degrees. Wang's warped
+    SG is off by 0.1 to 1.2 here."""
     rng = np.random.default_rng(7)
     materials = Materials(np.zeros((1, 3)), np.array([0.04]), np.array([roughness]))
     mine, expected = [], []
@@ -176,7 +177,8 @@ def test_gloss_near_the_mirror_direction(roughness: float, sharpness: float, mos
         found = lobes(UP, view[None], np.zeros(1, int), materials, one_light(light, sharpness))
         mine.append(unhidden(found)[0, 0])
         expected.append(by_quadrature(view, light, sharpness, roughness))
-    assert np.abs(np.subtract(mine, expected)).max() < most * max(expected)
+    error = np.subtract(mine, expected)
+    assert np.sqrt(np.mean(error**2) / np.mean(np.square(expected))) < most
 
 
 def test_a_material_without_gloss_has_none() -> None:

@@ -37,7 +37,7 @@ class Scene(NamedTuple):
 def scene() -> Scene:
     ball, floor = sphere(16), square(12)
     return Scene(
-        np.concatenate([ball.vertices + [0, 0, 1], floor.vertices * 6]),
+        np.concatenate([ball.vertices + np.array([0, 0, 1]), floor.vertices * 6]),
         np.concatenate([ball.triangles, floor.triangles + len(ball.vertices)]),
         np.concatenate([ball.normals, floor.normals]),
         np.repeat([0, 1], [len(ball.vertices), len(floor.vertices)]),

@@ -1,0 +1,116 @@
+"""Pictures of the default scene under the sky: speed, against no compression, against Mitsuba."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from PIL import Image
+
+from assets_defs.ssdf_lighting.compression import decoder_of_basis
+from assets_defs.ssdf_lighting.frames import FrameSettings
+from assets_defs.ssdf_lighting.lights import LightSettings
+from assets_defs.ssdf_lighting.meshes import scene_of
+from assets_defs.workspace import CHECKOUT
+from pipelines import environments
+from pipelines.ssdf_lighting import frames
+from pipelines.ssdf_lighting.decoding import distances_along, matrix_along
+from pipelines.ssdf_lighting.environment_fit import fit_lights
+from pipelines.ssdf_lighting.pictures import error_map
+from pipelines.ssdf_lighting.scene import Scene
+
+SIZE = (640, 480)
+TURNS = 24
+REFERENCE_SIZE, REFERENCE_SAMPLES, REFERENCE_RUNS = (320, 240), 64, 4
+PICTURE = CHECKOUT / "docs" / "pictures" / "ssdf-mitsuba.png"
+
+
+def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
+    """Frames a second while the light turns, PSNR, and the picture of where Mitsuba differs."""
+    scene, settings, look = scene_of(stored("scene_mesh")), LightSettings(), FrameSettings()
+    sky = environments.sky(
+        256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
+    )
+    lights = fit_lights(
+        sky,
+        settings.lights,
+        least_sharpness=settings.least_sharpness,
+        most_sharpness=settings.most_sharpness,
+    ).lights
+    camera = frames.scene_camera(scene, look.azimuth, look.elevation, SIZE[0] / SIZE[1])
+    matrix = stored("ssdf_matrix")["distances"].values
+    decoder = decoder_of_basis(stored("ssdf_basis"), len(matrix))
+
+    def compressed(vertices: Any, axes: Any) -> Any:
+        return distances_along(decoder, vertices, axes)
+
+    def uncompressed(vertices: Any, axes: Any) -> Any:
+        return matrix_along(matrix, vertices, axes)
+
+    turns = [360.0 * number / TURNS for number in range(TURNS)]
+    turn = frames.turning(scene, lights, compressed, camera, SIZE, turns)
+    exact = frames.turning(scene, lights, uncompressed, camera, SIZE, turns[::4])
+    scale = frames.scene_exposure(turn)
+    shown = turn.covered > 0.999
+    psnrs = [
+        frames.psnr(frames.exposed(one, scale), frames.exposed(other, scale), shown)
+        for one, other in zip(turn.radiance[::4], exact.radiance, strict=True)
+    ]
+    drawn = {
+        name: frames.turning(
+            scene, lights, look_up, camera, REFERENCE_SIZE, turns[:1], supersampling=4
+        )
+        for name, look_up in (("compressed", compressed), ("uncompressed", uncompressed))
+    }
+    reference = _by_mitsuba(scene, lights, camera)
+    inside = drawn["compressed"].covered > 0.999
+    by_mitsuba = frames.exposed(reference.mean(axis=0), scale)
+    ours = frames.exposed(drawn["compressed"].radiance[0], scale)
+    halves = [frames.exposed(half.mean(axis=0), scale) for half in np.split(reference, 2)]
+    sheet = np.hstack([by_mitsuba, ours, error_map(ours, by_mitsuba, 4.0)])
+    Image.fromarray(sheet).save(PICTURE, optimize=True)
+    return {
+        "relight_fps": 1.0 / float(np.median(turn.seconds)),
+        "relight_ms_slowest": 1000.0 * float(turn.seconds[1:].max()),
+        "renderer": turn.renderer,
+        "lights": settings.lights,
+        "sharpest_light": float(lights.sharpness.max()),
+        "relit_psnr_db": min(psnrs),
+        "relit_psnr_db_mean": float(np.mean(psnrs)),
+        "reference_psnr_db": frames.psnr(ours, by_mitsuba, inside),
+        "reference_psnr_db_uncompressed": frames.psnr(
+            frames.exposed(drawn["uncompressed"].radiance[0], scale), by_mitsuba, inside
+        ),
+        "reference_noise_psnr_db": frames.psnr(*halves, inside) + 10 * np.log10(4),
+    }
+
+
+def _by_mitsuba(scene: Scene, lights: Any, camera: Any) -> Any:
+    """Independent pictures (runs, H, W, 3)."""
+    from tests.reference.lit_scene import Part, pictures
+
+    parts = []
+    for part in range(len(scene.materials.albedo)):
+        used, corners = np.unique(scene.triangles[scene.part == part], return_inverse=True)
+        parts.append(Part(scene.vertices[used], corners.reshape(-1, 3), scene.normals[used]))
+    with tempfile.TemporaryDirectory() as folder:
+        render = pictures(
+            Path(folder),
+            parts,
+            scene.materials,
+            lights,
+            camera,
+            REFERENCE_SIZE,
+            REFERENCE_SAMPLES,
+            1,
+        )
+        runs = []
+        for run in range(REFERENCE_RUNS):
+            runs.append(render(run))
+            print(f"Mitsuba: {run + 1} of {REFERENCE_RUNS}", file=sys.stderr, flush=True)
+    return np.stack(runs)

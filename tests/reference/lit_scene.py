@@ -1,0 +1,154 @@
+"""Meshes under spherical Gaussians by Mitsuba: direct light, matt and glossy.
+
+Mitsuba knows the lights as a map of their radiance, the matt part as its ``diffuse`` and the gloss
+as its ``roughconductor`` with Beckmann's distribution, k = 0 and the eta of F0, which is Fresnel's
+reflection at a dielectric. Direct light adds up, so the two are rendered one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.ssdf_lighting.microfacets import Materials
+from pipelines.ssdf_lighting.spherical_gaussians import Lights, evaluate
+from pipelines.stage import Camera
+
+Array = NDArray[np.float64]
+
+MOST_SAMPLES = 1024
+"""Of one rendering: Mitsuba adds in single precision."""
+_MAP_HEIGHT = 512
+
+
+class Part(NamedTuple):
+    """A surface of one material: vertices, normals (V, 3), triangles (F, 3)."""
+
+    vertices: Array
+    triangles: NDArray[np.integer]
+    normals: Array
+
+
+def mitsuba() -> Any:
+    """Mitsuba in its scalar variant."""
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
+    return mitsuba
+
+
+def light_map(lights: Lights) -> dict[str, Any]:
+    """The lights as an environment. Its rows go from pole to pole, y is up, and a column's middle
+    is half a column from its edge."""
+    theta = np.pi * np.arange(_MAP_HEIGHT) / (_MAP_HEIGHT - 1)
+    phi = 2 * np.pi * (np.arange(2 * _MAP_HEIGHT) + 0.5) / (2 * _MAP_HEIGHT)
+    sine = np.sin(theta)[:, None]
+    height = np.broadcast_to(np.cos(theta)[:, None], (_MAP_HEIGHT, 2 * _MAP_HEIGHT))
+    ways = np.stack([sine * np.sin(phi), height, -sine * np.cos(phi)], axis=-1)
+    image = evaluate(lights, ways).astype(np.float32)
+    return {"type": "envmap", "bitmap": mitsuba().Bitmap(image), "scale": 1.0}
+
+
+def pictures(
+    folder: Path,
+    parts: Sequence[Part],
+    materials: Materials,
+    lights: Lights,
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int,
+    seed: int,
+) -> Callable[[int], Array]:
+    """A function of the number of a run: its radiance (H, W, 3), independent of other runs'."""
+    black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+    matt = [
+        {"type": "diffuse", "reflectance": {"type": "rgb", "value": albedo.tolist()}}
+        for albedo in materials.albedo
+    ]
+    root = np.sqrt(materials.specular)
+    glossy = [
+        {
+            "type": "roughconductor",
+            "distribution": "beckmann",
+            "alpha": float(roughness),
+            "eta": float((1 + r) / (1 - r)),
+            "k": 0.0,
+        }
+        if r > 0
+        else black
+        for r, roughness in zip(root, materials.roughness, strict=True)
+    ]
+    files = [_write_ply(part, folder / f"{number}.ply") for number, part in enumerate(parts)]
+    looks = [matt, glossy] if (materials.specular > 0).any() else [matt]
+    scenes = [_scene(files, look, lights, camera, size, samples) for look in looks]
+
+    def rendered(run: int) -> Array:
+        picture = np.zeros((size[1], size[0], 3))
+        for number, scene in enumerate(scenes):
+            of_run = (seed + run) * 2 + number
+            picture += np.array(mitsuba().render(scene, spp=samples, seed=of_run), np.float64)
+        return picture
+
+    return rendered
+
+
+def _scene(
+    files: Sequence[str],
+    materials: Sequence[dict[str, Any]],
+    lights: Lights,
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int,
+) -> Any:
+    width, height = size
+    shapes = {
+        f"object {number}": {"type": "ply", "filename": file, "material": material}
+        for number, (file, material) in enumerate(zip(files, materials, strict=True))
+    }
+    transform = (
+        mitsuba()
+        .ScalarTransform4f()
+        .look_at(origin=list(camera.position), target=list(camera.target), up=list(camera.up))
+    )
+    return mitsuba().load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct", "hide_emitters": True},
+            "sensor": {
+                "type": "perspective",
+                "fov": camera.view_angle,
+                "fov_axis": "y",
+                "near_clip": 1e-3,
+                "to_world": transform,
+                "film": {
+                    "type": "hdrfilm",
+                    "width": width,
+                    "height": height,
+                    "rfilter": {"type": "box"},
+                    "pixel_format": "rgb",
+                    "component_format": "float32",
+                },
+                "sampler": {"type": "independent", "sample_count": min(samples, MOST_SAMPLES)},
+            },
+            "sky": light_map(lights),
+            **shapes,
+        },
+        optimize=False,
+    )
+
+
+def _write_ply(part: Part, path: Path) -> str:
+    """Positions and normals in text: nothing is lost that float32 has."""
+    rows = np.concatenate([part.vertices, part.normals], axis=1)
+    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    path.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex {len(rows)}\n{properties}"
+        f"element face {len(part.triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+        + "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in rows)
+        + "".join(f"3 {a} {b} {c}\n" for a, b, c in part.triangles)
+    )
+    return str(path)

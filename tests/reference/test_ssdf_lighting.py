@@ -1,0 +1,234 @@
+"""The ray-traced reference of the SSDF lighting against Mitsuba's direct illumination.
+
+A sphere on a floor. Mitsuba knows the lights as a map of their radiance, the matt part as its
+``diffuse`` and the gloss as its ``roughconductor`` with Beckmann's distribution, eta = 1.5 and
+k = 0, which is Fresnel's reflection at a dielectric; direct light adds up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+
+from pipelines.geometry import Mesh, sphere, square
+from pipelines.raycasting import build_scene, first_hits
+from pipelines.ssdf_lighting.camera_rays import camera_rays, pixel_middles
+from pipelines.ssdf_lighting.ray_traced import ray_traced
+from pipelines.ssdf_lighting.shading import Materials
+from pipelines.ssdf_lighting.spherical_gaussians import Lights, evaluate
+from pipelines.stage import orbit
+
+Array = NDArray[np.float64]
+
+SIZE = (40, 30)
+SAMPLES = 128
+RUNS = 16
+"""Independent pictures; their spread is the error, whatever the samples of one have in common."""
+CAMERA = orbit((0.0, 0.0, 0.8), 6.0, -60.0, 30.0, view_angle=28.0)
+MATERIALS = Materials(
+    np.array([[0.5, 0.3, 0.2], [0.6, 0.6, 0.6]]), np.array([0.04, 0.0]), np.array([0.3, 0.3])
+)
+_MAP_HEIGHT = 512
+
+
+def lights() -> Lights:
+    axes = np.array([[0.5, -0.6, 0.6], [-0.7, -0.3, 0.5], [0.1, -0.9, 0.2], [0.0, 0.0, 1.0]])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    colours = np.array([[3.0, 2.5, 2.0], [0.5, 1.0, 2.0], [2.0, 0.5, 0.5], [0.4, 0.4, 0.4]])
+    return Lights(axes, np.array([30.0, 8.0, 15.0, 1.0]), colours)
+
+
+def objects() -> tuple[Mesh, Mesh]:
+    ball, floor = sphere(24), square(4)
+    return (
+        Mesh(ball.vertices + np.array([0, 0, 1.0]), ball.triangles, ball.uvs, ball.normals),
+        Mesh(floor.vertices * 8, floor.triangles, floor.uvs, floor.normals),
+    )
+
+
+def mitsuba() -> Any:
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
+    return mitsuba
+
+
+def light_map() -> dict[str, Any]:
+    """The lights as Mitsuba's environment. Its rows go from pole to pole, y is up, and a column's
+    middle is half a column from its edge: see the test of what it says."""
+    theta = np.pi * np.arange(_MAP_HEIGHT) / (_MAP_HEIGHT - 1)
+    phi = 2 * np.pi * (np.arange(2 * _MAP_HEIGHT) + 0.5) / (2 * _MAP_HEIGHT)
+    sine = np.sin(theta)[:, None]
+    height = np.broadcast_to(np.cos(theta)[:, None], (_MAP_HEIGHT, 2 * _MAP_HEIGHT))
+    ways = np.stack([sine * np.sin(phi), height, -sine * np.cos(phi)], axis=-1)
+    image = evaluate(lights(), ways).astype(np.float32)
+    return {"type": "envmap", "bitmap": mitsuba().Bitmap(image), "scale": 1.0}
+
+
+def write_ply(mesh: Mesh, path: Path) -> str:
+    """Positions and normals in text: nothing is lost that float32 has."""
+    rows = np.concatenate([mesh.vertices, mesh.normals], axis=1)
+    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    path.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex {len(rows)}\n{properties}"
+        f"element face {len(mesh.triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+        + "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in rows)
+        + "".join(f"3 {a} {b} {c}\n" for a, b, c in mesh.triangles)
+    )
+    return str(path)
+
+
+def by_mitsuba(
+    folder: Path, materials: list[dict[str, Any]], first_seed: int
+) -> tuple[Array, Array]:
+    """Radiance and its standard error (H, W, 3) with these materials of sphere and floor."""
+    width, height = SIZE
+    shapes = {
+        f"object {number}": {
+            "type": "ply",
+            "filename": write_ply(mesh, folder / f"{number}.ply"),
+            "material": material,
+        }
+        for number, (mesh, material) in enumerate(zip(objects(), materials, strict=True))
+    }
+    transform = (
+        mitsuba()
+        .ScalarTransform4f()
+        .look_at(origin=list(CAMERA.position), target=list(CAMERA.target), up=list(CAMERA.up))
+    )
+    scene = mitsuba().load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct"},
+            "sensor": {
+                "type": "perspective",
+                "fov": CAMERA.view_angle,
+                "fov_axis": "y",
+                "to_world": transform,
+                "film": {
+                    "type": "hdrfilm",
+                    "width": width,
+                    "height": height,
+                    "rfilter": {"type": "box"},
+                    "pixel_format": "rgb",
+                    "component_format": "float32",
+                },
+                "sampler": {"type": "independent", "sample_count": SAMPLES},
+            },
+            "sky": light_map(),
+            **shapes,
+        },
+        optimize=False,
+    )
+    return mean_and_error(
+        np.array(mitsuba().render(scene, spp=SAMPLES, seed=first_seed + run), np.float64)
+        for run in range(RUNS)
+    )
+
+
+def mean_and_error(pictures: Iterable[Array]) -> tuple[Array, Array]:
+    values = np.stack(list(pictures))
+    return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(RUNS)
+
+
+def matt(colour: Array) -> dict[str, Any]:
+    return {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour.tolist()}}
+
+
+def clearly_shown() -> NDArray[np.bool_]:
+    """Pixels (H, W) that show one object, the sphere not from its rim: there, smooth normals turn
+    away from the viewer, and each renderer makes something else of them."""
+    meshes = objects()
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    triangles = np.concatenate([meshes[0].triangles, meshes[1].triangles + len(meshes[0].vertices)])
+    origins, ways = camera_rays(CAMERA, SIZE, pixel_middles(SIZE))
+    hit = first_hits(build_scene(vertices, triangles), origins, ways).triangle
+    kind = np.where(hit < 0, 2, np.where(hit < len(meshes[0].triangles), 0, 1))
+    kind = kind.reshape(SIZE[::-1])
+    return binary_erosion(kind == 0, iterations=2) | binary_erosion(kind == 1, iterations=2)
+
+
+def traced(materials: Materials) -> tuple[Array, Array]:
+    ball, floor = objects()
+    return mean_and_error(
+        ray_traced(
+            np.concatenate([ball.vertices, floor.vertices]),
+            np.concatenate([ball.triangles, floor.triangles + len(ball.vertices)]),
+            np.concatenate([ball.normals, floor.normals]),
+            np.repeat([0, 1], [len(ball.triangles), len(floor.triangles)]),
+            materials,
+            lights(),
+            CAMERA,
+            SIZE,
+            SAMPLES,
+            seed,
+            lambda share: None,
+        ).radiance[..., :3]
+        for seed in range(RUNS)
+    )
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Array, Array]:
+    """Matt and glossy light by Mitsuba, and the error of both."""
+    folder = tmp_path_factory.mktemp("meshes")
+    black = matt(np.zeros(3))
+    shiny = {
+        "type": "roughconductor",
+        "distribution": "beckmann",
+        "alpha": float(MATERIALS.roughness[0]),
+        "eta": 1.5,
+        "k": 0.0,
+    }
+    both = [
+        by_mitsuba(folder, [matt(colour) for colour in MATERIALS.albedo], 100),
+        by_mitsuba(folder, [shiny, black], 200),
+    ]
+    return both[0][0] + both[1][0], np.sqrt(both[0][1] ** 2 + both[1][1] ** 2)
+
+
+def differences(rendered: tuple[Array, Array], materials: Materials) -> Array:
+    """(traced - rendered) / error (P, 3) of the clearly shown pixels."""
+    shown = clearly_shown()
+    assert shown.mean() > 0.4
+    values, error = traced(materials)
+    gap = (values - rendered[0])[shown]
+    z: Array = gap / np.sqrt(error**2 + rendered[1] ** 2)[shown]
+    return z
+
+
+def test_mitsuba_sees_the_lights_that_we_mean() -> None:
+    mi = mitsuba()
+    scene = mi.load_dict({"type": "scene", "sky": light_map()})
+    for way in np.random.default_rng(0).normal(size=(50, 3)):
+        towards = way / np.linalg.norm(way)
+        interaction = mi.SurfaceInteraction3f()
+        interaction.wi = mi.Vector3f(*(-towards))
+        found = np.array(scene.environment().eval(interaction))
+        np.testing.assert_allclose(found, evaluate(lights(), towards), rtol=2e-3)
+
+
+def test_sphere_and_floor_agree_with_mitsuba(rendered: tuple[Array, Array]) -> None:
+    """Of errors that are estimates from 16 pictures each, z has a root mean square of 1.04."""
+    z = differences(rendered, MATERIALS)
+    assert 0.9 < np.sqrt(np.mean(z**2)) < 1.2
+    assert np.abs(z.mean(axis=0)).max() < 4 / np.sqrt(len(z))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        MATERIALS._replace(specular=np.array([0.06, 0.0])),
+        MATERIALS._replace(roughness=np.array([0.2, 0.3])),
+        MATERIALS._replace(albedo=MATERIALS.albedo * 1.05),
+    ],
+)
+def test_a_wrong_material_is_found_out(rendered: tuple[Array, Array], wrong: Materials) -> None:
+    z = differences(rendered, wrong)
+    assert np.abs(z.mean(axis=0)).max() > 6 / np.sqrt(len(z))
