@@ -6,6 +6,7 @@ sixteen times, too. docs/ssdf.md says what each figure means.
 
 from __future__ import annotations
 
+import functools
 import json
 import subprocess
 import sys
@@ -69,7 +70,7 @@ def run(scale: str) -> dict[str, Any]:
 
         matrix = stored("ssdf_matrix")["distances"].values
         for part in (_tables, _compact, _curve):
-            _timed(figures, part.__name__, lambda part=part: part(stored, matrix, figures))
+            _timed(figures, part.__name__, functools.partial(part, stored, matrix, figures))
         np.save(Path(folder) / "matrix.npy", matrix)
         _timed(figures, "codecs", lambda: _codecs(Path(folder) / "matrix.npy", figures))
         _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
@@ -150,7 +151,7 @@ def _tables(
             ("90", None, PAPER_CONTRIBUTION),
         ):
             pca = clustered_pca(
-                lambda numbers, rows=rows: rows[numbers],
+                functools.partial(np.take, rows, axis=0),
                 triangles,
                 clusters,
                 values=values,

@@ -32,7 +32,7 @@ def codec_bytes(matrix: NDArray[np.float32], rmse: float) -> dict[str, Any]:
     blocks = np.ascontiguousarray(rows.reshape(-1, n, n))
 
     def zfp(block: NDArray[np.float32], setting: float) -> tuple[int, NDArray[np.float32]]:
-        code = imagecodecs.zfp_encode(block, level=float(setting), mode="a")
+        code = imagecodecs.zfp_encode(block, level=float(setting), mode="a")  # type: ignore[arg-type]
         return len(code), imagecodecs.zfp_decode(code)
 
     def jxl(block: NDArray[np.float32], setting: float) -> tuple[int, NDArray[np.float32]]:

@@ -86,7 +86,7 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         "reference_psnr_db_uncompressed": frames.psnr(
             frames.exposed(drawn["uncompressed"].radiance[0], scale), by_mitsuba, inside
         ),
-        "reference_noise_psnr_db": frames.psnr(*halves, inside) + 10 * np.log10(4),
+        "reference_noise_psnr_db": frames.psnr(halves[0], halves[1], inside) + 10 * np.log10(4),
     }
 
 

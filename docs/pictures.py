@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from PIL import Image
 from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
+from assets_defs.ssdf_lighting import SSDF
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
+from pipelines.ssdf_lighting.pictures import curve_picture
 from storage.versions import VersionedStore
 
 FOLDER = Path(__file__).parent / "pictures"
@@ -44,6 +47,38 @@ def make_pictures(store: VersionedStore) -> None:
         )
     _moving("btf-wall.webp", _wall(store))
     _scratches(store)
+    _lighting(store)
+
+
+def _lighting(store: VersionedStore) -> None:
+    assert SSDF.overview is not None
+    overview = SSDF.overview(store, list(store.slots()))
+    _moving(
+        "ssdf-turning.webp",
+        np.stack(
+            [
+                np.vstack(at)
+                for at in zip(
+                    overview["teapot-turning-light"], overview["court-turning-light"], strict=True
+                )
+            ]
+        ),
+    )
+    keys = {"scene": "teapot", "environment": "sky"}
+    _row(
+        "ssdf-lit.jpg",
+        _shown(store, SSDF, "relit_frames", keys, "lit"),
+        _shown(store, SSDF, "relit_frames", keys | {"scene": "court"}, "lit"),
+        _shown(store, SSDF, "relit_frames", keys, "clusters"),
+    )
+    _row(
+        "ssdf-clusters.png",
+        _shown(store, SSDF, "relit_frames", keys, "clusters"),
+        _shown(store, SSDF, "triangle_clusters", {"scene": "teapot"}, "shared-basis"),
+        _shown(store, SSDF, "visibility", {"scene": "teapot"}, "visible-share"),
+    )
+    result = json.loads((Path("benchmarks") / "results" / "ssdf.json").read_text())
+    Image.fromarray(curve_picture(result["curve"])).save(FOLDER / "ssdf-curve.png", optimize=True)
 
 
 def _scratches(store: VersionedStore) -> None:

@@ -76,7 +76,7 @@ def _centred(block: NDArray[np.floating]) -> NDArray[np.float32]:
     return values
 
 
-def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float32]:
+def _orthonormal(columns: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.linalg.qr(columns)[0].astype(np.float32)
 
 
@@ -121,7 +121,7 @@ def right_singular_vectors(gram: NDArray[np.float64], lost: float) -> RightSingu
         width *= 2
     squares = np.maximum(values[::-1], 0.0)
     left = np.maximum(total - np.cumsum(squares), 0.0)
-    rank = min(int(np.searchsorted(-left, -lost)) + 1, columns)
+    rank = min(int(np.searchsorted(-left, -lost)) + 1, len(squares))
     signed = vectors[:, ::-1][:, :rank]
     signed = signed * np.where(signed[np.abs(signed).argmax(axis=0), np.arange(rank)] < 0, -1, 1)
     return RightSingularVectors(

@@ -99,7 +99,7 @@ def make_solid(vertices: ArrayLike, triangles: ArrayLike, *, crease: float = 35.
     if not 0 <= crease <= 180:
         raise ValueError(f"crease is {crease} degrees; expected 0 to 180")
     mesh = check_closed(vertices, triangles)
-    return Solid(*mesh, _creased_normals(*mesh, crease).astype(np.float32))
+    return Solid(*mesh, creased_normals(*mesh, crease).astype(np.float32))
 
 
 def _welded(
@@ -188,10 +188,11 @@ def _winding_numbers(
     return numbers
 
 
-def _creased_normals(
+def creased_normals(
     vertices: NDArray[np.float64], triangles: NDArray[np.integer], crease: float
 ) -> NDArray[np.float64]:
-    """(F, 3, 3): see `make_solid`. Triangles without area join in with all around a vertex."""
+    """Unit normals (F, 3, 3) of corners: see `make_solid`. Triangles without area join in with all
+    around a vertex."""
     by_triangle = geometry.angle_weighted_normals(vertices, triangles)
     weighted, summed = by_triangle.reshape(-1, 3), by_triangle.sum(axis=1)
     face = summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), _TINY)

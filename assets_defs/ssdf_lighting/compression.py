@@ -208,7 +208,7 @@ class BasisSettings(Settings):
         "compact", description="A shared basis in few bits, or the paper's vectors and weights"
     )
     rmse: float = Field(
-        0.01, gt=0.0, le=1.0, description="Compact: error, radians weighted by solid angle"
+        0.006, gt=0.0, le=1.0, description="Compact: error, radians weighted by solid angle"
     )
     file_budget: int | None = Field(
         None, ge=1000, description="Compact: bytes of the file instead; the least error for them"

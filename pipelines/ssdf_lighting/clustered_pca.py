@@ -59,6 +59,7 @@ def clustered_pca(
     """
     if (values is None) == (contribution is None):
         raise ValueError("values, contribution: expected one of them.")
+    wanted = 1.0 if contribution is None else contribution
     count = int(cluster.max()) + 1
     vectors, weights, rows, errors = [], [], [], []
     for number in range(count):
@@ -69,7 +70,7 @@ def clustered_pca(
             kept = min(values, len(sigma))
         else:
             share = np.cumsum(sigma) / max(float(sigma.sum()), 1e-300)
-            kept = min(int(np.searchsorted(share, contribution)) + 1, len(sigma))
+            kept = min(int(np.searchsorted(share, wanted)) + 1, len(sigma))
         vectors.append(right[:kept])
         weights.append((left[:, :kept] * sigma[:kept]).astype(np.float32))
         rows.append(members)

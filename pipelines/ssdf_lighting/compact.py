@@ -18,6 +18,7 @@ a vertex i of cluster c. `fit` makes the codes for a step; `searched` finds the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -158,25 +159,29 @@ def sigma_of(level: Codes, step: float) -> FloatArray:
     return step * 2.0 ** (level / _LEVELS_PER_OCTAVE)
 
 
-def _rounded(values: FloatArray, step: float) -> Codes:
+def _rounded(values: NDArray[np.floating], step: float) -> Codes:
     sizes = np.floor(np.abs(values) / step + _ROUNDING)
     return np.where(values < 0, -sizes, sizes).astype(np.int32)
 
 
-def cosines(rows: FloatArray) -> FloatArray:
+def cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
     """Orthonormal two-dimensional cosine transform of rows (R, n²) on the octahedral square."""
     from scipy.fft import dctn
 
+    if not len(rows):
+        return rows
     n = resolution_of(rows.shape[1])
-    return dctn(rows.reshape(-1, n, n), axes=(1, 2), norm="ortho").reshape(len(rows), -1)
+    return dctn(rows.reshape(-1, n, n), axes=(1, 2), norm="ortho").reshape(rows.shape)
 
 
-def from_cosines(rows: FloatArray) -> FloatArray:
+def from_cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
     """The inverse of `cosines`."""
     from scipy.fft import idctn
 
+    if not len(rows):
+        return rows
     n = resolution_of(rows.shape[1])
-    return idctn(rows.reshape(-1, n, n), axes=(1, 2), norm="ortho").reshape(len(rows), -1)
+    return idctn(rows.reshape(-1, n, n), axes=(1, 2), norm="ortho").reshape(rows.shape)
 
 
 # ---- what the codes mean ---------------------------------------------------------------------
@@ -211,16 +216,19 @@ def coordinates(compact: Compact) -> NDArray[np.float32]:
 def squared_error(basis: SharedBasis, compact: Compact) -> float:
     """Sum of squares of the error in memory, in the weighted domain, without touching the matrix.
 
-    Vectors of the shared basis are orthonormal before rounding: what the clusters miss in them,
-    what rounding adds to them, and what they leave out are at right angles but for second order.
+    With C the coordinates, Q the shared basis (orthonormal), and C', Q' what is decoded of them, the
+    error is (C - C') Q + C' (Q - Q'), and what the shared basis leaves out, which is at right
+    angles to the first, and to the second but for what is rounding of rounding.
     """
     rank = len(compact.shared)
+    decoded = coordinates(compact).astype(np.float64)
     missed = basis.coordinates.astype(np.float64)
-    missed[:, :rank] -= coordinates(compact)
-    off = shared_vectors(compact) - basis.vectors[:, :rank].T
-    rounding = (basis.sigma[:rank] ** 2 * (off.astype(np.float64) ** 2).sum(axis=1)).sum()
+    missed[:, :rank] -= decoded
+    off = (basis.vectors[:, :rank].T - shared_vectors(compact)).astype(np.float64)
+    rounding = ((decoded.T @ decoded) * (off @ off.T)).sum()
+    both = 2.0 * ((decoded.T @ missed) * (off @ basis.vectors.astype(np.float64))).sum()
     again = compact.shared.size * (MEMORY_STEP * compact.step) ** 2 / 12.0
-    return float((missed**2).sum() + rounding + again + basis.lost)
+    return float((missed**2).sum() + rounding + both + again + basis.lost)
 
 
 def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Compact:
@@ -237,10 +245,21 @@ def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Com
             f"{(basis.lost / entries) ** 0.5:.2g} rad that the shared basis leaves out."
         )
 
-    def measured(tried: Compact) -> float:
-        return float((squared_error(basis, tried) / entries) ** 0.5)
+    # Over what the basis leaves out the error grows with the step.
+    limit = math.sqrt(rmse**2 * entries - basis.lost)
 
-    return _largest(lambda step: fit(basis, cluster, factors, step), measured, rmse, 20.0 * rmse)
+    def measured(tried: Compact) -> float:
+        return math.sqrt(max(squared_error(basis, tried) - basis.lost, 0.0))
+
+    found = _largest(
+        lambda step: fit(basis, cluster, factors, step),
+        measured,
+        limit,
+        20.0 * limit / math.sqrt(entries),
+    )
+    if found is None:
+        raise ValueError(f"an error of {rmse:g} rad is out of reach; expected more.")
+    return found
 
 
 def searched_for_bytes(
@@ -254,9 +273,12 @@ def searched_for_bytes(
     Raises ValueError where no step does.
     """
     factors = factorise(basis, cluster)
-    return _largest(
+    found = _largest(
         lambda fineness: fit(basis, cluster, factors, 1.0 / fineness), count, float(budget), 5.0
     )
+    if found is None:
+        raise ValueError(f"{budget} bytes are out of reach; expected more.")
+    return found
 
 
 def _largest(
@@ -264,9 +286,9 @@ def _largest(
     measured: Callable[[Compact], float],
     limit: float,
     start: float,
-) -> Compact:
+) -> Compact | None:
     """What ``make`` makes of about the largest number whose measure, which grows with it, is within
-    the limit. Raises ValueError where none is found."""
+    the limit; None where none is found."""
     low, high, number = 0.0, np.inf, start
     best = None
     for _ in range(_ROUNDS):
@@ -282,6 +304,4 @@ def _largest(
         if not low < guess < high:
             guess = np.sqrt(max(low, high / 16.0) * min(high, low * 16.0)) if low else high / 4.0
         number = float(guess)
-    if best is None:
-        raise ValueError(f"{limit:g} is out of reach; expected more.")
     return best

@@ -9,6 +9,7 @@ far it is from the constant cosine, from its place in the shared basis.
 
 from __future__ import annotations
 
+import math
 import struct
 
 import numpy as np
@@ -17,11 +18,15 @@ from numpy.typing import NDArray
 
 from pipelines.ssdf_lighting.compact import Codes, Compact
 from pipelines.ssdf_lighting.entropy_coding import decode, encode
+from pipelines.ssdf_lighting.octahedral import resolution_of
 
 MAGIC = b"TSUYASDF"
 _VERSION = 1
 _HEADER = struct.Struct("<8sHHdIIIII")
 _MOST_LEVEL = 80
+_LARGEST_LEVEL = 4000  # 2^(4000 / 4) is finite
+_MOST_A_BYTE = 12_000
+"""Numbers that a byte can hold: the surest answer costs -log2(65504 / 65536) bits."""
 
 
 def to_bytes(compact: Compact) -> bytes:
@@ -59,23 +64,35 @@ def to_bytes(compact: Compact) -> bytes:
 
 
 def from_bytes(data: bytes) -> Compact:
-    """The codes of a file. Raises ValueError for what is no such file, or ends too early."""
+    """The codes of a file.
+
+    Raises ValueError for what is no such file, ends too early or does not fit together.
+    """
     if len(data) < _HEADER.size + 4 or data[:8] != MAGIC:
         raise ValueError("the file does not begin as compact SSDFs do; expected TSUYASDF.")
     _, version, n, step, rank, count, total, vertices, weights = _HEADER.unpack_from(data)
     if version != _VERSION:
         raise ValueError(f"the file's version is {version}; expected {_VERSION}.")
+    resolution_of(n * n)
+    numbers = (n * n + count + total) * rank + weights + vertices + count + total
+    if not 0.0 < step < math.inf or not count or numbers > _MOST_A_BYTE * len(data):
+        raise ValueError("the file is damaged: its header announces what it cannot hold.")
     (length,) = struct.unpack_from("<I", data, _HEADER.size)
     start = _HEADER.size + 4
     lengths = [count, rank, total, vertices]
     contexts = np.repeat(np.arange(4), lengths)
     small = decode(data[start : start + length], contexts)
     ranks, shared_level, level, moved = np.split(small, np.cumsum(lengths)[:-1])
+    if (ranks < 0).any() or ranks.sum() != total or ((moved < 0) | (moved >= count)).any():
+        raise ValueError("the file is damaged: its clusters do not add up.")
     shared_level = np.cumsum(shared_level).astype(np.int32)
     level = _summed(level, ranks)
+    both = np.concatenate([shared_level, level])
+    if ((both < 0) | (both > _LARGEST_LEVEL)).any():
+        raise ValueError("the file is damaged: its levels are out of range.")
     cluster = _moved_back(moved, count)
     sizes = np.bincount(cluster, minlength=count)
-    if ranks.sum() != total or (ranks * sizes).sum() != weights:
+    if (ranks * sizes).sum() != weights:
         raise ValueError("the file is damaged: its clusters do not add up.")
     large = decode(data[start + length :], _contexts(n, shared_level, level, ranks, sizes))
     cuts = np.cumsum([rank * n * n, count * rank, total * rank])
@@ -107,10 +124,9 @@ def _differences(level: Codes, ranks: Codes) -> Codes:
 
 
 def _summed(steps: Codes, ranks: Codes) -> Codes:
-    sums = np.cumsum(steps)
+    sums = np.concatenate([[0], np.cumsum(steps)])
     starts = np.cumsum(ranks) - ranks
-    before = np.where(starts > 0, sums[np.maximum(starts, 1) - 1], 0)
-    return (sums - np.repeat(before, ranks)).astype(np.int32)
+    return (sums[1:] - np.repeat(sums[starts], ranks)).astype(np.int32)
 
 
 @njit(cache=True)
@@ -133,7 +149,7 @@ def _moved_back(moved: Codes, count: int) -> Codes:
     recent = np.arange(count)
     cluster = np.empty(len(moved), np.int32)
     for k in range(len(moved)):
-        place = min(max(moved[k], 0), count - 1)
+        place = moved[k]
         cluster[k] = recent[place]
         recent[1 : place + 1] = recent[:place].copy()
         recent[0] = cluster[k]

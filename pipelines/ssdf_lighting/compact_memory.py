@@ -116,6 +116,8 @@ def row_bytes(bits: Bytes) -> int:
 
 def pack_rows(codes: Codes, bits: Bytes) -> Bytes:
     """Rows of bytes (rows, bytes) of codes (rows, columns)."""
+    if not len(codes):
+        return np.empty((0, row_bytes(bits)), np.uint8)
     whole = [
         np.ascontiguousarray(codes[:, bits == width].astype(kind)).view(np.uint8)
         for width, kind in _WHOLE.items()
@@ -129,6 +131,8 @@ def pack_rows(codes: Codes, bits: Bytes) -> Bytes:
 def unpack_rows(rows: Bytes, bits: Bytes) -> Codes:
     """Codes (rows, columns) int32 of rows of bytes."""
     codes = np.empty((len(rows), len(bits)), np.int32)
+    if not codes.size:
+        return codes
     start = 0
     for width, kind in _WHOLE.items():
         end = start + int((bits == width).sum()) * width // 8

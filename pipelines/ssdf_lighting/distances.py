@@ -78,7 +78,18 @@ def distances_to_arcs(visible: NDArray[np.bool_], edge: VisibleEdge) -> NDArray[
     ``visible`` (P, n²) gives the sign; NO_EDGE where a point has no edge.
     """
     distances = np.empty(visible.shape, np.float32)
-    _to_arcs(visible, *edge, *_tiles(round(visible.shape[1] ** 0.5)), distances)
+    tiles = _tiles(round(visible.shape[1] ** 0.5))
+    _to_arcs(
+        visible,
+        edge.crossings,
+        edge.arcs,
+        edge.starts,
+        tiles.order,
+        tiles.ways,
+        tiles.middles,
+        tiles.radii,
+        distances,
+    )
     return distances
 
 

@@ -3,7 +3,8 @@
 With k = sqrt(1 + λ) and s = sin d the share's logit is nearly an odd polynomial in x = k s whose
 coefficients are polynomials in 1 / k. They were fitted to ``visible_integral``: off by 0.0017 at
 most for λ >= 2 and |d| <= pi/2. Beyond, where caps go on, x grows by 0.65 k a radian: off by 0.004
-for λ >= 2.5. In Mesa's software renderer it takes an eighth of the time of the table.
+for λ >= 2.5. In Mesa's software renderer a frame of 16 lights took 180 ms
+with it and uniforms, 600 ms with the table and lights in a texture.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ def _encode(
         _shift(state, code)
     if state[_PLACE] > len(code):
         return -1
-    return state[_PLACE]
+    return int(state[_PLACE])
 
 
 @njit(cache=True, nogil=True)
@@ -179,7 +179,7 @@ def _get(state: NDArray[np.int64], code: NDArray[np.uint8], chance: int) -> int:
 def _next(state: NDArray[np.int64], code: NDArray[np.uint8]) -> int:
     place = state[_PLACE]
     state[_PLACE] += 1
-    return np.int64(code[place]) if place < len(code) else np.int64(0)
+    return int(code[place]) if place < len(code) else 0
 
 
 @njit(cache=True, nogil=True)

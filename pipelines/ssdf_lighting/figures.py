@@ -85,9 +85,9 @@ def distance_error(
     """Largest error of d (P, D), radians, by all pairs.
 
     Distances to samples must be equal. Those to the refined edge lie below, for a path to a
-    sample of the other visibility crosses the edge, and by at most the longest side of a Delaunay
-    triangle, for that far behind the edge there is a sample. Where all samples are alike, the
-    edge of a hole between them may be anywhere.
+    sample of the other visibility crosses the edge; and where the sky is visible by at most the
+    longest side of a Delaunay triangle, for that far behind the edge there is a sample. (Hidden
+    directions may be near a hole between the samples.)
     """
     exact = all_pairs_distances(visible)
     if not refined:
@@ -95,9 +95,8 @@ def distance_error(
     n = resolution_of(visible.shape[1])
     ends = texel_directions(n)[delaunay_sides(n).ends]
     longest = 2.0 * np.arcsin(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max() / 2.0)
-    slack = np.where(np.abs(exact) == NO_EDGE, NO_EDGE, longest)
     over = np.abs(distances) - np.abs(exact)
-    under = np.abs(exact) - slack - np.abs(distances)
+    under = np.where(visible, exact - longest - distances, 0.0)
     flipped = np.where(np.sign(distances) == np.sign(exact), 0.0, np.abs(exact))
     return float(max(over.max(), under.max(), flipped.max(), 0.0))
 

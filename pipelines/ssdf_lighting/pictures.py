@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +59,25 @@ def error_histogram(vertex_rmse: NDArray[np.floating], rmse: float) -> NDArray[n
     axes.axvline(rmse, color="#d95f0e", label=f"all: {rmse:.4f} rad")
     axes.set(xscale="log", xlabel="RMSE of a vertex, rad", ylabel="vertices")
     axes.legend()
+    return drawn(canvas)
+
+
+def curve_picture(curve: Mapping[str, Mapping[str, Any]]) -> NDArray[np.uint8]:
+    """Bytes against error, by the number of clusters: the paper's form for 4 to 96 values, the
+    compact one for several steps (``paper``: values, bytes, error; ``ours``: step, bytes of the
+    file, in memory, error)."""
+    figure, canvas = new_figure(8.0, 4.6)
+    axes = figure.add_subplot()
+    shades = np.linspace(0.25, 1.0, len(curve))
+    for shade, (clusters, forms) in zip(shades, curve.items(), strict=True):
+        paper, ours = np.array(forms["paper"]), np.array(forms["ours"])
+        orange, blue = (0.85, 0.37, 0.05, shade), (0.13, 0.40, 0.67, shade)
+        axes.plot(paper[:, 1], paper[:, 2], "o-", color=orange, label=f"paper's form, {clusters}")
+        axes.plot(ours[:, 2], ours[:, 3], "s--", color=blue, label=f"in memory, {clusters}")
+        axes.plot(ours[:, 1], ours[:, 3], "s-", color=blue, label=f"file, {clusters}")
+    axes.set(xscale="log", yscale="log", xlabel="bytes", ylabel="RMSE, rad")
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside right center", title="form, clusters", fontsize=7)
     return drawn(canvas)
 
 

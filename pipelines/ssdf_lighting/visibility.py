@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.mesh_repair import connected, edges
 from pipelines.raycasting import first_hits, occluded
 
 if TYPE_CHECKING:
@@ -28,6 +29,10 @@ _LITTLE_SKY = 0.05
 """Share of the directions up to which a vertex may be buried."""
 _ENOUGH = 256
 """Rays from a vertex that tell whether it is buried."""
+_CLEARANCE = 0.15
+"""Room around a ray's origin, in its height."""
+_MOST_PIECES = 256
+"""Geometries that the surfaces are told apart by."""
 
 
 class RayOrigins(NamedTuple):
@@ -46,14 +51,18 @@ def ray_origins(
 ) -> RayOrigins:
     """Origins just off the surface, on its outer side.
 
-    vertices (V, 3), each position once; triangles (F, 3); normals (V, 3) unit; ``scene`` holds
+    vertices (V, 3); triangles (F, 3); normals (V, 3) unit; ``scene`` holds
     the same triangles in the same order. A first choice lies above the vertex along its normal.
     Where something else is in between or touches, points above each triangle at the vertex are
     tried, moved a little into the triangle. Half of the height is used where another surface is
     nearer than that.
     """
     lift = _lifts(vertices, triangles)
-    points, free = _lifted(scene, triangles, vertices, np.arange(len(vertices)), normals, lift)
+    # Doubled vertices, along creases, have the same triangles around them.
+    place = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)
+    welded = place[triangles]
+    pieces = _pieces(scene, vertices, triangles)
+    points, free = _lifted(pieces, welded, vertices, place, normals, lift)
     corners = triangles.ravel().astype(np.int64)
     trouble = np.flatnonzero(~free[corners])
     sealed = ~free
@@ -65,7 +74,7 @@ def ray_origins(
         inward = (a + b + c) / 3.0 - vertices[vertex]
         inward /= np.linalg.norm(inward, axis=1, keepdims=True)
         start = vertices[vertex] + 4.0 * lift[vertex, None] * inward
-        there, found = _lifted(scene, triangles, start, vertex, face_normal, lift[vertex])
+        there, found = _lifted(pieces, welded, start, place[vertex], face_normal, lift[vertex])
         first_free = np.flatnonzero(found)[::-1]  # the last write, the first triangle, wins
         points[vertex[first_free]] = there[first_free]
         sealed[vertex[first_free]] = False
@@ -153,8 +162,40 @@ def _lifts(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
     return lifts
 
 
+class _Pieces(NamedTuple):
+    """A scene of several geometries. Primitive k of geometry g is the triangle
+    ``order[start[g] + k]``."""
+
+    scene: RaycastingScene
+    order: NDArray[np.int64]
+    start: NDArray[np.int64]
+
+
+def _pieces(
+    scene: RaycastingScene, vertices: FloatArray, triangles: NDArray[np.integer]
+) -> _Pieces:
+    """A geometry for each piece that hangs together by edges.
+
+    Where surfaces touch, rays meet both at one distance, and of what is met at one distance Open3D
+    lists but one primitive a geometry.
+    """
+    import open3d as o3d
+
+    piece = connected(edges(triangles.astype(np.int64)).pairs() // 3, len(triangles))
+    piece %= _MOST_PIECES
+    order = np.argsort(piece, kind="stable")
+    counts = np.bincount(piece)
+    start = np.cumsum(counts) - counts
+    if len(counts) > 1:
+        scene = o3d.t.geometry.RaycastingScene()
+        positions = o3d.core.Tensor.from_numpy(vertices.astype(np.float32))
+        for some in np.split(triangles[order].astype(np.uint32), start[1:]):
+            scene.add_triangles(positions, o3d.core.Tensor.from_numpy(some))
+    return _Pieces(scene, order, start)
+
+
 def _lifted(
-    scene: RaycastingScene,
+    pieces: _Pieces,
     triangles: NDArray[np.integer],
     starts: FloatArray,
     vertex: NDArray[np.integer],
@@ -170,14 +211,20 @@ def _lifted(
 
     below = starts - 0.25 * lift[:, None] * normals
     rays = np.concatenate([below, normals], axis=1).astype(np.float32)
-    met = scene.list_intersections(o3d.core.Tensor.from_numpy(rays))
+    met = pieces.scene.list_intersections(o3d.core.Tensor.from_numpy(rays))
     splits, height = met["ray_splits"].numpy().astype(np.int64), met["t_hit"].numpy()
+    begin = pieces.start[met["geometry_ids"].numpy()]
+    triangle = pieces.order[begin + met["primitive_ids"].numpy()]
     ray = np.repeat(np.arange(len(starts)), np.diff(splits))
-    own = (triangles[met["primitive_ids"].numpy()] == vertex[ray, None]).any(axis=1)
+    own = (triangles[triangle] == vertex[ray, None]).any(axis=1)
     height = height - 0.25 * lift[ray]
     other = ~own & (height < 2.0 * lift[ray])
     touching = np.zeros(len(starts), bool)
     touching[ray[other & (height <= 0.1 * lift[ray])]] = True
     nearest = 2.0 * lift
     np.minimum.at(nearest, ray[other], height[other])
-    return starts + 0.5 * np.maximum(nearest, 0.0)[:, None] * normals, ~touching
+    above = 0.5 * np.maximum(nearest, 0.0)
+    points = starts + above[:, None] * normals
+    # A surface that the way up lies in is not met by it.
+    around = pieces.scene.compute_distance(o3d.core.Tensor.from_numpy(points.astype(np.float32)))
+    return points, ~touching & (around.numpy() > _CLEARANCE * above)

@@ -22,6 +22,7 @@ from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
+from assets_defs.ssdf_lighting import SSDF
 from assets_defs.system import Source, System, partition_key
 from storage.schemas import schemas_of
 from storage.versions import Slot
@@ -84,6 +85,21 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "scratch_layers": set(),
         "glass_object": set(),
         "glass_frames": {"scratch_table_2d", "scratch_table", "scratch_layers", "glass_object"},
+    }
+    assert _parents(house, SSDF) == {
+        "scene_mesh": set(),
+        "visibility": {"scene_mesh"},
+        "ssdf_matrix": {"scene_mesh", "visibility"},
+        "triangle_clusters": {"scene_mesh", "ssdf_matrix"},
+        "ssdf_basis": {"scene_mesh", "ssdf_matrix", "triangle_clusters"},
+        "environment_lights": set(),
+        "relit_frames": {
+            "scene_mesh",
+            "ssdf_matrix",
+            "triangle_clusters",
+            "ssdf_basis",
+            "environment_lights",
+        },
     }
     for system in SYSTEMS.values():
         assert [plan.schema for plan in system.plans.values()] == list(schemas_of(system.name))

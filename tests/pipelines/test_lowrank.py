@@ -1,4 +1,4 @@
-"""Principal components against NumPy's singular value decomposition."""
+"""Principal components and right singular vectors against NumPy's singular value decomposition."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.lowrank import Blocks, principal_components
+from pipelines.lowrank import Blocks, principal_components, right_singular_vectors
 
 
 def decaying(rows: int, columns: int, *, decay: float = 0.7, seed: int = 0) -> NDArray[np.float64]:
@@ -156,3 +156,95 @@ def test_a_rank_that_the_matrix_cannot_have_is_refused(rank: int) -> None:
 def test_no_blocks_are_refused() -> None:
     with pytest.raises(ValueError, match="0 x 0 matrix"):
         principal_components(lambda: [], 1)
+
+
+# ---- right singular vectors ------------------------------------------------------------------
+
+
+def with_spectrum(rows: int, spectrum: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+    """A matrix with these singular values."""
+    random = np.random.default_rng(len(spectrum))
+    left = np.linalg.qr(random.standard_normal((rows, len(spectrum))))[0]
+    right = np.linalg.qr(random.standard_normal((columns, len(spectrum))))[0]
+    matrix: NDArray[np.float64] = (left * spectrum) @ right.T
+    return matrix
+
+
+SPECTRA = {
+    "decaying": 10 * 0.9 ** np.arange(100),
+    "slow": np.arange(1.0, 201.0) ** -1.0,
+    "steps": np.repeat([30.0, 3.0, 0.1], [5, 20, 175]),
+}
+
+
+@pytest.mark.parametrize("columns", [200, 900])
+@pytest.mark.parametrize("name", SPECTRA)
+@pytest.mark.parametrize("share", [0.3, 1e-2, 1e-4])
+def test_the_fewest_right_singular_vectors_that_leave_out_so_much(
+    share: float, name: str, columns: int
+) -> None:
+    """By a complete decomposition (200 columns), and by iteration in a subspace (900)."""
+    spectrum = SPECTRA[name]
+    matrix = with_spectrum(300, spectrum, columns)
+    total = (spectrum**2).sum()
+    found = right_singular_vectors(matrix.T @ matrix, share * total)
+    left_out = total - np.cumsum(spectrum**2)
+    fewest = int(np.argmax(left_out <= share * total * (1 + 1e-9))) + 1
+    assert fewest <= found.vectors.shape[1] <= fewest + (columns > 256)
+    kept = len(found.singular_values)
+    np.testing.assert_allclose(found.singular_values, spectrum[:kept], rtol=1e-3)
+    vectors = found.vectors.astype(np.float64)
+    np.testing.assert_allclose(vectors.T @ vectors, np.eye(kept), atol=1e-5)
+    lost = ((matrix - matrix @ vectors @ vectors.T) ** 2).sum()
+    assert found.lost == pytest.approx(lost, rel=1e-3, abs=1e-6 * total)
+    assert found.lost <= share * total
+    signs = vectors[np.abs(vectors).argmax(axis=0), np.arange(kept)]
+    assert (signs > 0).all()
+
+
+def test_right_singular_vectors_are_those_of_the_svd() -> None:
+    matrix = with_spectrum(300, SPECTRA["decaying"], 900)
+    found = right_singular_vectors(matrix.T @ matrix, 1e-3 * (matrix**2).sum())
+    right = np.linalg.svd(matrix, full_matrices=False)[2]
+    kept = len(found.singular_values)
+    np.testing.assert_allclose(np.abs((found.vectors.T * right[:kept]).sum(axis=1)), 1, atol=1e-3)
+
+
+def test_where_nearly_all_are_needed_all_are_found() -> None:
+    """Noise, of which the subspace would have to be nearly everything."""
+    matrix = np.random.default_rng(2).standard_normal((500, 400))
+    gram = matrix.T @ matrix
+    found = right_singular_vectors(gram, 1e-4 * np.trace(gram))
+    squares = np.linalg.eigvalsh(gram)[::-1]
+    fewest = int(np.argmax(squares.sum() - np.cumsum(squares) <= 1e-4 * squares.sum())) + 1
+    assert len(found.singular_values) == fewest
+    np.testing.assert_allclose(found.singular_values**2, squares[:fewest], rtol=1e-9)
+
+
+@pytest.mark.parametrize("columns", [40, 300])
+@pytest.mark.parametrize("lost", [0.0, 1e-300, 1e-13])
+@pytest.mark.parametrize("rank", [0, 1, 5, 30])
+def test_a_matrix_of_low_rank_and_nothing_to_be_lost(rank: int, lost: float, columns: int) -> None:
+    """What rounding leaves counts, so there may be more vectors than the rank, but no fewer."""
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        matrix = random.standard_normal((50, rank)) @ random.standard_normal((rank, columns))
+        found = right_singular_vectors(matrix.T @ matrix, lost)
+        kept = len(found.singular_values)
+        assert max(rank, 1) <= kept <= columns
+        assert found.vectors.shape == (columns, kept)
+        assert np.isfinite(found.vectors).all()
+        lengths = np.linalg.svd(matrix, compute_uv=False)[:kept]
+        np.testing.assert_allclose(
+            found.singular_values[: len(lengths)],
+            lengths,
+            atol=1e-4 * max(lengths.max(initial=0.0), 1e-9),
+        )
+        assert found.lost <= max(lost, 1e-9 * (matrix**2).sum())
+
+
+def test_all_may_be_lost_and_one_is_left() -> None:
+    matrix = with_spectrum(50, np.array([3.0, 2.0, 1.0]), 20)
+    found = right_singular_vectors(matrix.T @ matrix, 100.0)
+    np.testing.assert_allclose(found.singular_values, [3.0], rtol=1e-6)
+    assert found.lost == pytest.approx(5.0)

@@ -64,13 +64,13 @@ def pictures(
     seed: int,
 ) -> Callable[[int], Array]:
     """A function of the number of a run: its radiance (H, W, 3), independent of other runs'."""
-    black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
-    matt = [
+    black: dict[str, Any] = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+    matt: list[dict[str, Any]] = [
         {"type": "diffuse", "reflectance": {"type": "rgb", "value": albedo.tolist()}}
         for albedo in materials.albedo
     ]
     root = np.sqrt(materials.specular)
-    glossy = [
+    glossy: list[dict[str, Any]] = [
         {
             "type": "roughconductor",
             "distribution": "beckmann",

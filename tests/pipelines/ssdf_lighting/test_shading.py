@@ -97,7 +97,7 @@ def distance_to(edge: Array, axes: Array, visible: NDArray[np.bool_]) -> Array:
     return np.where(visible, angle, -angle)
 
 
-def behind_walls(sharpness: float, count: int = 40) -> tuple[Array, Array]:
+def behind_walls(sharpness: float, count: int = 24) -> tuple[Array, Array]:
     """Radiance of a plane at walls that hide a random half of the sky: shaded, by quadrature."""
     rng = np.random.default_rng(3)
     phi = np.linspace(0, 2 * np.pi, 4000, endpoint=False)
@@ -113,7 +113,7 @@ def behind_walls(sharpness: float, count: int = 40) -> tuple[Array, Array]:
         towards = lobe.axes[0, :1]
         shown = (towards[:, 2] > 0) & (towards @ wall > 0)
         d = np.append(distance_to(edge, towards, shown), 0.0)[None]
-        ways, weights = around(axis, sharpness)
+        ways, weights = around(axis, sharpness, 300)
         seen = np.maximum(ways[:, 2], 0) * (ways @ wall > 0)
         found[:, k] = shaded(lobe, d, TABLE)[0, 0], np.sum(weights * seen) / np.pi
     return found[0], found[1]

@@ -1,0 +1,174 @@
+"""Scenes: counts of the paper, closed boxes, positions that can be had back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipelines import geometry
+from pipelines.mesh_repair import connected, edges
+from pipelines.ssdf_lighting.microfacets import Materials, check_materials
+from pipelines.ssdf_lighting.scene import (
+    SCENES,
+    Scene,
+    built_in_scene,
+    make_scene,
+    split_by_part,
+)
+
+Floats = NDArray[np.float64]
+
+ONE = Materials(np.full((1, 3), 0.5), np.zeros(1), np.full(1, 0.2))
+TWO = Materials(np.full((2, 3), 0.5), np.zeros(2), np.full(2, 0.2))
+
+
+@pytest.fixture(scope="module")
+def court() -> Scene:
+    return built_in_scene("court", 10, 16)
+
+
+def places(scene: Scene) -> Floats:
+    return scene.vertices * scene.scale + scene.middle
+
+
+def check(scene: Scene) -> None:
+    """What every scene promises."""
+    assert len(np.unique(scene.vertices, axis=0)) == len(scene.vertices)
+    np.testing.assert_array_equal(np.unique(scene.triangles), np.arange(len(scene.vertices)))
+    np.testing.assert_allclose(np.linalg.norm(scene.normals, axis=1), 1, atol=1e-12)
+    assert scene.part.shape == (len(scene.triangles),)
+    assert set(scene.part.tolist()) == set(range(len(scene.materials.albedo)))
+    check_materials(scene.materials)
+    low, high = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
+    np.testing.assert_allclose(low, -high, atol=1e-9)
+    assert np.linalg.norm(scene.vertices, axis=1).max() == pytest.approx(1)
+
+
+def test_the_teapot_has_as_many_vertices_as_the_papers() -> None:
+    """The paper has 12 801 + 4225: Newell's teapot of 20 segments (32 n² + 4 n + 2 positions, of
+    which two bottoms and rims differ with the copy) on a floor of 65 x 65."""
+    scene = built_in_scene("teapot", 20, 64)
+    check(scene)
+    assert len(scene.vertices) == 12_881 + 65**2
+    floor = np.unique(scene.triangles[scene.part == 1])
+    assert len(floor) == 65**2
+    pot = np.unique(scene.triangles[scene.part == 0])
+    assert abs(len(pot) - 12_801) < 0.01 * 12_801
+    np.testing.assert_allclose(scene.normals[floor], [[0, 0, 1]] * len(floor), atol=1e-12)
+    assert scene.vertices[pot, 2].min() >= scene.vertices[floor, 2].min() - 1e-9
+    assert scene.materials.specular[0] > 0 == scene.materials.specular[1]
+
+
+def signed_volume(vertices: Floats, triangles: NDArray[np.integer]) -> float:
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    return float(np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6)
+
+
+def test_walls_of_the_court_are_closed_and_face_outwards(court: Scene) -> None:
+    check(court)
+    vertices, triangles = places(court), court.triangles.astype(np.int64)
+    walls = triangles[court.part == 1]
+    # The sum over all five boxes, as they are described, whatever vertices they share.
+    expected = 0.1 * 0.86 + 0.1 * 0.8 + 1.6 * 0.1 * 0.7 + 0.03 * 1.2 * 0.6 + 0.15 * 0.15 * 1.3
+    assert signed_volume(vertices, walls) == pytest.approx(expected, rel=1e-9)
+    directed = np.stack([walls, np.roll(walls, -1, axis=1)], axis=-1).reshape(-1, 2)
+    there, counts = np.unique(directed, axis=0, return_counts=True)
+    back, back_counts = np.unique(directed[:, ::-1], axis=0, return_counts=True)
+    np.testing.assert_array_equal(there, back)
+    np.testing.assert_array_equal(counts, back_counts)
+    piece = connected(edges(walls).pairs() // 3, len(walls))
+    for number in range(int(piece.max()) + 1):
+        own = walls[piece == number]
+        assert signed_volume(vertices - vertices[own[0, 0]], own) > 0
+    assert len(np.unique(piece)) == 5
+    area = np.linalg.norm(
+        np.cross(
+            vertices[walls[:, 1]] - vertices[walls[:, 0]],
+            vertices[walls[:, 2]] - vertices[walls[:, 0]],
+        ),
+        axis=1,
+    ).sum() / 2  # fmt: skip
+    sizes = [(0.1, 0.86, 1), (0.1, 0.8, 1), (1.6, 0.1, 0.7), (0.03, 1.2, 0.6), (0.15, 0.15, 1.3)]
+    assert area == pytest.approx(sum(2 * (a * b + b * c + c * a) for a, b, c in sizes), rel=1e-9)
+
+
+def test_the_court_stands_on_its_floor(court: Scene) -> None:
+    vertices = places(court)
+    floor = np.unique(court.triangles[court.part == 0])
+    np.testing.assert_allclose(vertices[floor, 2], 0, atol=1e-12)
+    assert vertices[:, 2].min() == pytest.approx(0, abs=1e-12)
+    ball = np.unique(court.triangles[court.part == 2])
+    away = np.linalg.norm(vertices[ball] - [0.2, 0.1, 0.35], axis=1)
+    np.testing.assert_allclose(away, 0.35, atol=1e-9)
+    assert signed_volume(vertices, court.triangles[court.part == 2]) == pytest.approx(
+        4 / 3 * np.pi * 0.35**3, rel=0.03
+    )
+
+
+def test_other_scenes_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"^scene is 'kitchen'; expected one of teapot, court\.$"):
+        built_in_scene("kitchen", 4, 4)
+    assert SCENES == ("teapot", "court")
+
+
+@pytest.mark.parametrize(("size", "away"), [(1.0, 0.0), (1e-4, 7.0), (5e4, -1e6)])
+def test_given_positions_can_be_had_back(size: float, away: float) -> None:
+    ball = geometry.sphere(8)
+    given = ball.vertices * [size, size / 2, size / 3] + away
+    scene = make_scene(given, ball.triangles, np.zeros(len(ball.triangles), int), ONE)
+    check(scene)
+    found = places(scene)
+    distance = np.linalg.norm(found[:, None] - given[None], axis=2).min(axis=1)
+    assert distance.max() < 1e-9 * max(size, abs(away))
+    assert scene.scale == pytest.approx(size, rel=1e-6)
+    np.testing.assert_allclose(scene.middle, away, atol=1e-6 * size)
+
+
+def test_vertices_of_no_triangle_do_not_count() -> None:
+    ball = geometry.sphere(8)
+    vertices = np.concatenate([ball.vertices, [[1e6, 0, 0]]])
+    scene = make_scene(vertices, ball.triangles, np.zeros(len(ball.triangles), int), ONE)
+    check(scene)
+    assert scene.scale == pytest.approx(1)
+
+
+def test_triangles_keep_their_part_when_others_are_dropped() -> None:
+    """One has no area, one is there twice, one is turned over."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]])
+    triangles = [[0, 1, 1], [0, 1, 4], [1, 2, 4], [4, 1, 0], [2, 3, 4], [3, 4, 0]]
+    scene = make_scene(corners, triangles, [0, 1, 0, 0, 1, 0], TWO)
+    np.testing.assert_array_equal(scene.part, [1, 0, 1, 0])
+    np.testing.assert_allclose(scene.normals, [[0, 0, 1]] * 5, atol=1e-12)
+    assert len(scene.notes) >= 3
+
+
+def test_no_mesh_is_refused() -> None:
+    with pytest.raises(ValueError, match="all vertices are at one position"):
+        make_scene(np.ones((3, 3)), [[0, 1, 2]], [0], ONE)
+    with pytest.raises(ValueError, match="there are no triangles"):
+        make_scene(np.ones((3, 3)), np.zeros((0, 3), int), np.zeros(0, int), ONE)
+    with pytest.raises(ValueError, match="vertices"):
+        make_scene(np.full((3, 3), np.nan), [[0, 1, 2]], [0], ONE)
+
+
+def test_drawn_vertices_have_one_material_and_make_the_same_triangles(court: Scene) -> None:
+    for scene in (court, two_colours()):
+        drawn = split_by_part(scene)
+        np.testing.assert_array_equal(drawn.source[drawn.triangles], scene.triangles)
+        np.testing.assert_array_equal(
+            drawn.part[drawn.triangles], np.repeat(scene.part[:, None], 3, axis=1)
+        )
+        pairs = np.stack([drawn.source, drawn.part], axis=1)
+        assert len(np.unique(pairs, axis=0)) == len(pairs)
+        np.testing.assert_array_equal(np.unique(drawn.triangles), np.arange(len(drawn.source)))
+
+
+def two_colours() -> Scene:
+    """A sphere in two halves, which share the vertices of a line."""
+    ball = geometry.sphere(8)
+    right = (ball.vertices[ball.triangles].mean(axis=1)[:, 0] > 0).astype(int)
+    scene = make_scene(ball.vertices, ball.triangles, right, TWO)
+    drawn = split_by_part(scene)
+    assert len(drawn.source) > len(scene.vertices)
+    return scene
