@@ -216,8 +216,8 @@ def coordinates(compact: Compact) -> NDArray[np.float32]:
 def squared_error(basis: SharedBasis, compact: Compact) -> float:
     """Sum of squares of the error in memory, in the weighted domain, without touching the matrix.
 
-    With C the coordinates, Q the shared basis (orthonormal), and C', Q' what is decoded of them, the
-    error is (C - C') Q + C' (Q - Q'), and what the shared basis leaves out, which is at right
+    With C the coordinates, Q the shared basis (orthonormal), and C', Q' what is decoded of them,
+    the error is (C - C') Q + C' (Q - Q'), and what the shared basis leaves out, which is at right
     angles to the first, and to the second but for what is rounding of rounding.
     """
     rank = len(compact.shared)

@@ -1,8 +1,8 @@
 """Scenes to be lit: objects on a floor that are built in, and what a user's mesh becomes.
 
-A scene is brought to a size of its own: its middle is the origin and the sphere around its box has
-radius 1, so that a mesh in millimetres or a kilometre wide, or far from its origin, keeps all its
-digits in single precision. z is up.
+A scene is brought to a size of its own: the middle of its box is the origin and the sphere around
+that has radius 1, so that a mesh in millimetres or a kilometre wide, or far from its origin, keeps
+all its digits in single precision. z is up.
 """
 
 from __future__ import annotations

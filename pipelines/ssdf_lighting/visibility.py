@@ -75,9 +75,13 @@ def ray_origins(
         inward /= np.linalg.norm(inward, axis=1, keepdims=True)
         start = vertices[vertex] + 4.0 * lift[vertex, None] * inward
         there, found = _lifted(pieces, welded, start, place[vertex], face_normal, lift[vertex])
-        first_free = np.flatnonzero(found)[::-1]  # the last write, the first triangle, wins
-        points[vertex[first_free]] = there[first_free]
-        sealed[vertex[first_free]] = False
+        free_ones = np.flatnonzero(found)[::-1]
+        # Where surfaces cross, one side may be inside the other body.
+        inside = _from_behind(scene, vertices, triangles, there[free_ones], face_normal[free_ones])
+        # The last write wins: the first triangle outside, or else the first.
+        chosen = free_ones[np.argsort(~inside, kind="stable")]
+        points[vertex[chosen]] = there[chosen]
+        sealed[vertex[chosen]] = False
     return RayOrigins(points.astype(np.float32), sealed)
 
 
@@ -120,9 +124,7 @@ def stand_ins(
     some = np.random.default_rng(0).permutation(directions)[:_ENOUGH]
     for vertex in dark:
         upper = some[some @ normals[vertex] > 0.0]
-        met = first_hits(scene, origins.points[vertex], upper).triangle
-        a, b, c = vertices[triangles[met[met >= 0]]].transpose(1, 0, 2)
-        from_behind = np.einsum("ki,ki->k", np.cross(b - a, c - a), upper[met >= 0]) > 0.0
+        from_behind = _from_behind(scene, vertices, triangles, origins.points[vertex], upper)
         buried[vertex] |= int(from_behind.sum()) * 2 > len(upper)
     sees_none = np.flatnonzero(visible_share == 0.0)
     above = first_hits(scene, origins.points[sees_none], normals[sees_none]).distance
@@ -144,6 +146,20 @@ def stand_ins(
         return_predecessors=True,
     )
     return np.where(buried & np.isfinite(far), nearest, number)
+
+
+def _from_behind(
+    scene: RaycastingScene,
+    vertices: FloatArray,
+    triangles: NDArray[np.integer],
+    starts: NDArray[np.floating],
+    ways: FloatArray,
+) -> NDArray[np.bool_]:
+    """Whether rays from ``starts`` (3,) or (N, 3) along ``ways`` (N, 3) meet a surface's back."""
+    met = first_hits(scene, starts, ways).triangle
+    a, b, c = vertices[triangles[met]].transpose(1, 0, 2)
+    facing: NDArray[np.bool_] = np.einsum("ki,ki->k", np.cross(b - a, c - a), ways) > 0.0
+    return facing & (met >= 0)
 
 
 def _mean_edges(vertices: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:

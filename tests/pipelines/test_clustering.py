@@ -121,9 +121,7 @@ def test_more_clusters_than_different_points_and_none_are_refused(clusters: int)
 # ---- seeds that are the farthest -------------------------------------------------------------
 
 
-def farthest_seeds(
-    points: NDArray[np.floating], clusters: int, first: int
-) -> NDArray[np.floating]:
+def farthest_seeds(points: NDArray[np.floating], clusters: int, first: int) -> NDArray[np.floating]:
     """Every further seed the point farthest from its nearest seed, by all distances."""
     away = np.sqrt(squared_distances(points, points))
     seeds = [first]

@@ -1,15 +1,11 @@
 """The ray-traced reference of the SSDF lighting against Mitsuba's direct illumination.
 
-A sphere on a floor. Mitsuba knows the lights as a map of their radiance, the matt part as its
-``diffuse`` and the gloss as its ``roughconductor`` with Beckmann's distribution, eta = 1.5 and
-k = 0, which is Fresnel's reflection at a dielectric; direct light adds up.
+A sphere on a floor.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +19,7 @@ from pipelines.ssdf_lighting.ray_traced import ray_traced
 from pipelines.ssdf_lighting.shading import Materials
 from pipelines.ssdf_lighting.spherical_gaussians import Lights, evaluate
 from pipelines.stage import orbit
+from tests.reference.lit_scene import Part, light_map, mitsuba, pictures
 
 Array = NDArray[np.float64]
 
@@ -34,7 +31,6 @@ CAMERA = orbit((0.0, 0.0, 0.8), 6.0, -60.0, 30.0, view_angle=28.0)
 MATERIALS = Materials(
     np.array([[0.5, 0.3, 0.2], [0.6, 0.6, 0.6]]), np.array([0.04, 0.0]), np.array([0.3, 0.3])
 )
-_MAP_HEIGHT = 512
 
 
 def lights() -> Lights:
@@ -52,94 +48,9 @@ def objects() -> tuple[Mesh, Mesh]:
     )
 
 
-def mitsuba() -> Any:
-    import mitsuba
-
-    mitsuba.set_variant("scalar_rgb")
-    return mitsuba
-
-
-def light_map() -> dict[str, Any]:
-    """The lights as Mitsuba's environment. Its rows go from pole to pole, y is up, and a column's
-    middle is half a column from its edge: see the test of what it says."""
-    theta = np.pi * np.arange(_MAP_HEIGHT) / (_MAP_HEIGHT - 1)
-    phi = 2 * np.pi * (np.arange(2 * _MAP_HEIGHT) + 0.5) / (2 * _MAP_HEIGHT)
-    sine = np.sin(theta)[:, None]
-    height = np.broadcast_to(np.cos(theta)[:, None], (_MAP_HEIGHT, 2 * _MAP_HEIGHT))
-    ways = np.stack([sine * np.sin(phi), height, -sine * np.cos(phi)], axis=-1)
-    image = evaluate(lights(), ways).astype(np.float32)
-    return {"type": "envmap", "bitmap": mitsuba().Bitmap(image), "scale": 1.0}
-
-
-def write_ply(mesh: Mesh, path: Path) -> str:
-    """Positions and normals as float32, binary."""
-    rows = np.concatenate([mesh.vertices, mesh.normals], axis=1).astype("<f4")
-    faces = np.zeros(len(mesh.triangles), [("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, mesh.triangles
-    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    path.write_bytes(header.encode() + rows.tobytes() + faces.tobytes())
-    return str(path)
-
-
-def by_mitsuba(
-    folder: Path, materials: list[dict[str, Any]], first_seed: int
-) -> tuple[Array, Array]:
-    """Radiance and its standard error (H, W, 3) with these materials of sphere and floor."""
-    width, height = SIZE
-    shapes = {
-        f"object {number}": {
-            "type": "ply",
-            "filename": write_ply(mesh, folder / f"{number}.ply"),
-            "material": material,
-        }
-        for number, (mesh, material) in enumerate(zip(objects(), materials, strict=True))
-    }
-    transform = (
-        mitsuba()
-        .ScalarTransform4f()
-        .look_at(origin=list(CAMERA.position), target=list(CAMERA.target), up=list(CAMERA.up))
-    )
-    scene = mitsuba().load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "direct"},
-            "sensor": {
-                "type": "perspective",
-                "fov": CAMERA.view_angle,
-                "fov_axis": "y",
-                "to_world": transform,
-                "film": {
-                    "type": "hdrfilm",
-                    "width": width,
-                    "height": height,
-                    "rfilter": {"type": "box"},
-                    "pixel_format": "rgb",
-                    "component_format": "float32",
-                },
-                "sampler": {"type": "independent", "sample_count": SAMPLES},
-            },
-            "sky": light_map(),
-            **shapes,
-        },
-        optimize=False,
-    )
-    return mean_and_error(
-        np.array(mitsuba().render(scene, spp=SAMPLES, seed=first_seed + run), np.float64)
-        for run in range(RUNS)
-    )
-
-
 def mean_and_error(pictures: Iterable[Array]) -> tuple[Array, Array]:
     values = np.stack(list(pictures))
     return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(RUNS)
-
-
-def matt(colour: Array) -> dict[str, Any]:
-    return {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour.tolist()}}
 
 
 def clearly_shown() -> NDArray[np.bool_]:
@@ -178,20 +89,10 @@ def traced(materials: Materials) -> tuple[Array, Array]:
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Array, Array]:
     """Matt and glossy light by Mitsuba, and the error of both."""
+    parts = [Part(mesh.vertices, mesh.triangles, mesh.normals) for mesh in objects()]
     folder = tmp_path_factory.mktemp("meshes")
-    black = matt(np.zeros(3))
-    shiny = {
-        "type": "roughconductor",
-        "distribution": "beckmann",
-        "alpha": float(MATERIALS.roughness[0]),
-        "eta": 1.5,
-        "k": 0.0,
-    }
-    both = [
-        by_mitsuba(folder, [matt(colour) for colour in MATERIALS.albedo], 100),
-        by_mitsuba(folder, [shiny, black], 200),
-    ]
-    return both[0][0] + both[1][0], np.sqrt(both[0][1] ** 2 + both[1][1] ** 2)
+    render = pictures(folder, parts, MATERIALS, lights(), CAMERA, SIZE, SAMPLES, 100)
+    return mean_and_error(render(run) for run in range(RUNS))
 
 
 def differences(rendered: tuple[Array, Array], materials: Materials) -> Array:
@@ -206,7 +107,7 @@ def differences(rendered: tuple[Array, Array], materials: Materials) -> Array:
 
 def test_mitsuba_sees_the_lights_that_we_mean() -> None:
     mi = mitsuba()
-    scene = mi.load_dict({"type": "scene", "sky": light_map()})
+    scene = mi.load_dict({"type": "scene", "sky": light_map(lights())})
     for way in np.random.default_rng(0).normal(size=(50, 3)):
         towards = way / np.linalg.norm(way)
         interaction = mi.SurfaceInteraction3f()

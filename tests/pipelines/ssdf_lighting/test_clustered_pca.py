@@ -50,7 +50,9 @@ def blocks(pca: ClusteredPca) -> list[tuple[NDArray[np.int32], Matrix, Matrix]]:
         vertices = pca.row_vertex[pca.row_first[number] : pca.row_first[number + 1]]
         vectors = pca.vectors[pca.first[number] : pca.first[number + 1]]
         size = len(vertices) * len(vectors)
-        found.append((vertices, pca.weights[place : place + size].reshape(len(vertices), -1), vectors))
+        found.append(
+            (vertices, pca.weights[place : place + size].reshape(len(vertices), -1), vectors)
+        )
         place += size
     assert place == len(pca.weights)
     return found

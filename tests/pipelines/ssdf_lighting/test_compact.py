@@ -70,6 +70,8 @@ def basis_of(matrix: Matrix, rank: int | None = None) -> SharedBasis:
 
 
 class Given(NamedTuple):
+    """A scene's distances, clusters and shared basis."""
+
     matrix: Matrix
     cluster: Ints
     basis: SharedBasis
@@ -145,9 +147,7 @@ def test_what_is_decoded_is_near_what_was_given(scene: Given) -> None:
     assert np.sqrt((missed.astype(np.float64) ** 2).mean()) < 2 * step
     assert compact.resolution == N
     assert compact.sizes.sum() == len(scene.matrix)
-    np.testing.assert_array_equal(
-        scene.cluster[compact.vertices_in_order], np.sort(scene.cluster)
-    )
+    np.testing.assert_array_equal(scene.cluster[compact.vertices_in_order], np.sort(scene.cluster))
 
 
 # ---- errors ----------------------------------------------------------------------------------
@@ -205,9 +205,7 @@ def test_the_error_asked_for_is_met_and_used_up(scene: Given, rmse: float) -> No
 
 
 @pytest.mark.parametrize("above", [1.003, 1.02, 1.1, 1.5])
-def test_an_error_just_above_what_the_shared_basis_loses_is_met(
-    scene: Given, above: float
-) -> None:
+def test_an_error_just_above_what_the_shared_basis_loses_is_met(scene: Given, above: float) -> None:
     few = basis_of(scene.matrix, 40)
     rmse = above * math.sqrt(few.lost / scene.matrix.size)
     compact = searched(few, scene.cluster, rmse)

@@ -26,7 +26,9 @@ def some_codes(
     random = np.random.default_rng(seed)
 
     def codes(*shape: int) -> np.ndarray:
-        return np.rint(random.standard_t(1.5, shape) * largest / 10).clip(-1e9, 1e9).astype(np.int32)
+        return (
+            np.rint(random.standard_t(1.5, shape) * largest / 10).clip(-1e9, 1e9).astype(np.int32)
+        )
 
     ranks = random.integers(0, rank + 1, clusters).astype(np.int32)
     cluster = random.integers(0, clusters, vertices).astype(np.int32)
@@ -100,7 +102,7 @@ def test_other_files_are_refused() -> None:
 def test_every_file_that_ends_too_early_is_refused(seed: int) -> None:
     data = to_bytes(some_codes(seed))
     for length in range(len(data)):
-        with pytest.raises(ValueError, match="expected|damaged"):
+        with pytest.raises(ValueError, match=r"expected|damaged"):
             from_bytes(data[:length])
 
 

@@ -104,7 +104,7 @@ def test_a_row_is_laid_out_as_described() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_all_vertices_are_decoded_as_the_codes_say(seed: int) -> None:
-    """The shared basis is rounded once more: to half a step over sigma, off by a quarter at most."""
+    """The shared basis is rounded once more: to half a step over sigma."""
     compact = some_codes(seed)
     found = decoded_rows(decoder_of(packed(compact)), np.arange(50))
     coordinate = coordinates(compact).astype(np.float64)

@@ -134,7 +134,10 @@ def loops(points: list[Floats]) -> VisibleEdge:
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     crossings = np.concatenate(points).astype(np.float32)
     following = np.concatenate(
-        [start + np.roll(np.arange(count), -1) for start, count in zip(starts[:-1], counts, strict=True)]
+        [
+            start + np.roll(np.arange(count), -1)
+            for start, count in zip(starts[:-1], counts, strict=True)
+        ]
     )
     arcs = np.stack([np.arange(len(crossings)), following], axis=-1).astype(np.int32)
     return VisibleEdge(crossings, arcs, starts)

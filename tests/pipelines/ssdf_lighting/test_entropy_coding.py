@@ -126,7 +126,9 @@ def test_bytes_are_these_on_every_machine() -> None:
 
 @pytest.mark.parametrize("value", [1 << 30, -(1 << 30), 1 << 40])
 def test_too_large_numbers_are_refused(value: int) -> None:
-    with pytest.raises(ValueError, match=rf"^values reach {abs(value)}; expected sizes below 2\^30"):
+    with pytest.raises(
+        ValueError, match=rf"^values reach {abs(value)}; expected sizes below 2\^30"
+    ):
         encode(np.array([0, value]), np.zeros(2, np.int64))
 
 

@@ -65,7 +65,7 @@ def test_visibility_is_tested_by_another_method_and_faults_are_found() -> None:
         return visibility_error(*around[:2], origins.points, sealed, seen, WAYS)
 
     assert error(visible) == 0.0
-    assert error(~visible) > 0.99
+    assert error(~visible) > 0.95  # all but rays past edges, left to either method
     random = np.random.default_rng(3)
     flipped = visible ^ (random.random(visible.shape) < 0.2)
     assert 0.1 < error(flipped) < 0.3
@@ -114,7 +114,7 @@ def test_right_distances_have_no_error_and_one_fault_is_measured() -> None:
 def a_scene() -> tuple[Bools, NDArray[np.float32]]:
     """Refined distances below a square."""
     flat = geometry.square(2)
-    rays = build_scene(flat.vertices + [0.1, 0.2, 0.4], flat.triangles)
+    rays = build_scene(flat.vertices + np.array([0.1, 0.2, 0.4]), flat.triangles)
     origins = RayOrigins(np.float32([[0, 0, 0], [0.3, 0.1, 0.1]]), np.zeros(2, bool))
     visible = visible_directions(rays, origins, WAYS)
     return visible, distances_to_arcs(visible, visible_edge(rays, origins.points, visible))

@@ -286,7 +286,9 @@ def test_what_is_read_is_continuous_all_over_the_sphere(n: int) -> None:
     along = rng.uniform(-1, 1, 500)
     for side in (-1.0, 1.0):
         border = np.stack([np.full(500, side), along], -1)
-        just_inside = [directions_of(border * [1 - 1e-9, 1]) for border in (border, border * [1, -1])]
+        just_inside = [
+            directions_of(border * [1 - 1e-9, 1]) for border in (border, border * [1, -1])
+        ]
         np.testing.assert_allclose(read(just_inside[0]), read(just_inside[1]), atol=1e-6)
 
 

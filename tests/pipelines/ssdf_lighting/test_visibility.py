@@ -1,4 +1,4 @@
-"""Visibility against horizons that are known: convex bodies, half spaces, contacts, sheets, gaps."""
+"""Visibility against known horizons: convex bodies, half spaces, contacts, sheets, gaps."""
 
 from __future__ import annotations
 
@@ -103,6 +103,12 @@ def tube(start: float, end: float, radius: float, rings: int, around: int = 16) 
     return vertices, quads.reshape(-1, 3).astype(np.int32)
 
 
+def facing(seen: Seen, normal: Sequence[float]) -> Bools:
+    """Vertices of a flat side: along sharp edges each side has its own."""
+    found: Bools = seen.scene.normals @ np.array(normal) > 0.99
+    return found
+
+
 def above(normal: Sequence[float]) -> tuple[Bools, Bools]:
     """Directions surely above a horizon, and surely below it."""
     cosine = WAYS @ np.array(normal)
@@ -174,7 +180,8 @@ def test_neither_size_nor_place_change_what_is_seen(scale: float, away: float) -
 @pytest.mark.parametrize("segments", [2, 3, 4, 5, 7])
 def test_a_box_on_a_floor_neither_leaks_nor_shadows_itself(segments: int) -> None:
     """Its foot stands in the floor's plane, its underside on it: whatever is seen from there is
-    above the floor, once the buried ones have their stand-ins."""
+    above the floor. What the box covers of the floor has stand-ins; of its underside nothing is
+    open, it stays dark."""
     seen = look(
         plane((-2, -2), (2, 2), 0.0, 9), box((-0.47, -0.53, 0.0), (0.5, 0.511, 1.0), segments)
     )
@@ -186,16 +193,46 @@ def test_a_box_on_a_floor_neither_leaks_nor_shadows_itself(segments: int) -> Non
     covered = low & (np.abs(seen.places[:, :2]) < 0.46).all(axis=1)
     assert covered.sum() > 4
     assert not seen.visible[covered].any()
-    assert (stored[covered].mean(axis=1) > 0.05).all()
+    on_floor = facing(seen, (0, 0, 1))
+    assert (stored[covered & on_floor].mean(axis=1) > 0.05).all()
+    assert not seen.visible[low & facing(seen, (0, 0, -1))].any()
     assert not seen.origins.sealed[~low].any()
     # Walls see their half of the sky above the floor; on the foot, too.
     wall = np.isclose(seen.places[:, 0], 0.5) & (np.abs(seen.places[:, 1]) < 0.5)
-    wall &= (seen.places[:, 2] < 0.99) & (seen.places[:, 1] > -0.52)
+    wall &= (seen.places[:, 2] < 0.99) & facing(seen, (1, 0, 0))
     assert wall.sum() >= (segments - 1) * segments
     out, _ = above((1, 0, 0))
     up, _ = above((0, 0, 1))
     assert stored[wall][:, out & up].all()
     assert not stored[wall][:, above((1, 0, 0))[1]].any()
+
+
+@pytest.mark.parametrize("segments", [3, 4, 5, 6])
+@pytest.mark.parametrize("foot", [0.0, -0.2])
+def test_where_a_wall_meets_vertices_of_the_floor_both_see_their_open_side(
+    foot: float, segments: int
+) -> None:
+    """Vertices of the floor lie in the planes of the walls, and (sunk, of five or six segments)
+    vertices of the walls in that of the floor: whatever starts there starts on a surface."""
+    seen = look(
+        plane((-2, -2), (2, 2), 0.0, 16), box((-0.5, -0.5, foot), (0.5, 0.5, 1.0), segments)
+    )
+    stored = seen.visible[seen.stored]
+    at = np.abs(seen.places)
+    rim = (at[:, 2] < 1e-9) & np.isclose(at[:, :2].max(axis=1), 0.5)
+    rim &= at[:, :2].min(axis=1) < 0.45
+    floor = rim & facing(seen, (0, 0, 1))
+    assert floor.sum() >= 12
+    assert not stored[floor][:, above((0, 0, 1))[1]].any()
+    # Open is the quarter of the sphere that is above both; behind the wall nothing is.
+    for vertex in np.flatnonzero(floor):
+        side = np.zeros(3)
+        axis = int(at[vertex, :2].argmax())
+        side[axis] = np.sign(seen.places[vertex, axis])
+        out, back = above(side.tolist())
+        assert stored[vertex][out & above((0, 0, 1))[0]].all()
+        assert not stored[vertex][back].any()
+        assert seen.stored[vertex] == vertex
 
 
 @pytest.mark.parametrize("segments", [(4, 6), (3, 5), (4, 4)])
@@ -212,6 +249,7 @@ def test_boxes_that_touch_hide_the_contact_and_nothing_else(segments: tuple[int,
             flat &= np.abs(seen.places[:, 0]) < 0.999
             normal = [0.0, 0.0, 0.0]
             normal[axis] = float(end)
+            flat &= facing(seen, normal)
             over, under = above(normal)
             assert flat.any()
             assert seen.visible[flat][:, over].all()
@@ -258,8 +296,10 @@ def test_what_is_covered_on_all_sides_is_sealed_and_sees_nothing() -> None:
     assert middle.sum() > 16
     assert seen.origins.sealed[middle].all()
     assert not seen.visible[middle].any()
-    outer = ~(np.abs(seen.places) < 0.99).all(axis=1)
-    assert not seen.origins.sealed[outer].any()
+    outward = np.einsum("vi,vi->v", seen.places, seen.scene.normals) > 0.5
+    assert outward.sum() > 100
+    assert not seen.origins.sealed[outward].any()
+    assert (seen.visible[outward].mean(axis=1) > 0.4).all()
 
 
 def test_sealed_origins_see_nothing_whatever_the_rays_say() -> None:
@@ -275,7 +315,8 @@ def test_no_vertex_of_the_court_sees_the_sky_through_its_floor() -> None:
     """Walls that stand on the floor and touch each other, a ball that touches it in one point."""
     seen = look_around(built_in_scene("court", 8, 40))
     low = (np.abs(seen.places[:, :2]) < 1.95).all(axis=1) & (np.abs(seen.places[:, 2]) < 1e-9)
-    assert low.sum() > 1000
+    low &= ~facing(seen, (0, 0, -1))  # undersides, which stand on the floor: nobody sees them
+    assert low.sum() > 800
     _, under = above((0, 0, 1))
     assert not seen.visible[seen.stored][low][:, under].any()
 
