@@ -39,6 +39,7 @@ from pipelines.ssdf_lighting.distances import distances_to_samples
 from pipelines.ssdf_lighting.figures import compression_error
 from pipelines.ssdf_lighting.octahedral import solid_angles, texel_directions
 from pipelines.ssdf_lighting.refined import refined_distances
+from pipelines.ssdf_lighting.spherical_gaussians import integral, visible_integral
 from pipelines.ssdf_lighting.triangle_clusters import clusters_by_distance, clusters_by_position
 from pipelines.ssdf_lighting.visibility import RayOrigins, visible_directions
 from pipelines.ssdf_lighting.weighted_sphere import root_weights
@@ -52,7 +53,7 @@ SINGLE_FACTORS = {"default": (1, 4), "paper": (1, 4, 16)}
 CURVE_VALUES = (4, 8, 16, 32, 48, 64, 96)
 CURVE_CLUSTERS = (1, 4, 16, 64, 256)
 CURVE_STEPS = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
-NAIVE_VERTICES, FINE_VERTICES, FINE = 500, 400, 384
+NAIVE_VERTICES, FINE_VERTICES, FINE = 500, 250, 384
 
 
 def run(scale: str) -> dict[str, Any]:
@@ -75,6 +76,7 @@ def run(scale: str) -> dict[str, Any]:
         _timed(figures, "codecs", lambda: _codecs(Path(folder) / "matrix.npy", figures))
         _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
         _timed(figures, "edges", lambda: _edges(stored))
+        figures |= _slits()
         from benchmarks.ssdf_pictures import picture_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))
@@ -373,6 +375,21 @@ def _edges(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         "sample_error": float(errors[1]),
         "subcell_error_ratio_median_vertex": float(medians[0] / medians[1]),
     }
+
+
+def _slits() -> dict[str, Any]:
+    """What the nearest edge alone gets wrong: a light in the middle of a slit, as shares of it.
+
+    A band of half-width a lets f(a) - f(-a) through, the method f(a). Mean for a evenly up to twice
+    the light's width, 1 / sqrt(sharpness), and the most, at the thinnest.
+    """
+    found: dict[str, Any] = {"slit_error": {}, "slit_error_most": 0.0}
+    for sharpness in (10.0, 100.0, 300.0):
+        half = np.linspace(1e-3, 2.0, 200) / np.sqrt(sharpness)
+        over = visible_integral(-half, sharpness) / integral(sharpness)
+        found["slit_error"][f"{sharpness:g}"] = float(over.mean())
+        found["slit_error_most"] = max(found["slit_error_most"], float(over.max()))
+    return found
 
 
 def _all_pairs(visible: NDArray[np.bool_]) -> NDArray[np.float32]:
