@@ -126,7 +126,7 @@ def fit(
         size = len(one.left)
         kept = _worth(one.sigma, step, size + rank)
         level = _levels(one.sigma[:kept], step)
-        # sigma of the levels is a little off: what the vectors have less, the weights have more.
+        # A scale only, that decoding divides by again: it may be a little off.
         sigma = sigma_of(level, step)
         centres.append(_rounded(one.centre[:rank] * np.sqrt(size), step))
         bases.append(_rounded(one.right[:kept, :rank] * sigma[:, None], step))

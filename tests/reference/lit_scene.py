@@ -38,6 +38,7 @@ def mitsuba() -> Any:
     import mitsuba
 
     mitsuba.set_variant("scalar_rgb")
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)  # it would write between the figures
     return mitsuba
 
 
