@@ -110,7 +110,7 @@ def _coverage(checked: Checked) -> float:
             "reference_psnr",
             "The same against the traced picture, dB.",
             _reference_psnr,
-            at_least=10.0,
+            at_least=16.0,
             change=0.5,
         ),
         Check(
