@@ -127,7 +127,11 @@ SSDF_BASIS = Schema(
             ("weight",), "float32", "rad", "Row by row", f"{_PAPER}, S V", optional=True
         ),
         "relative_error": Variable(
-            ("cluster",), "float64", "1", "|lost| / |matrix| of each cluster", optional=True
+            ("cluster",),
+            "float64",
+            "1",
+            "Norm of what is lost over the norm of the matrix",
+            optional=True,
         ),
         "bytes_raw": Variable((), "int64", "byte", "The SSDFs in single precision"),
         "bytes_file": Variable((), "int64", "byte", "Of the compressed form on disk"),
