@@ -9,7 +9,7 @@ from pydantic import Field
 
 from assets_defs.checks import Check, Checked
 from assets_defs.settings import Preset, Settings
-from assets_defs.ssdf_lighting.compression import decoder_of_basis
+from assets_defs.ssdf_lighting.compression import decoder_of_basis, distance_blocks
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.ssdf_lighting.lights import lights_of
 from assets_defs.ssdf_lighting.meshes import scene_of
@@ -209,8 +209,6 @@ def _along_stored(
 ) -> NDArray[np.float32]:
     """Distances from the stored matrix, block by block; ``vertices`` are ascending."""
     import numpy as np
-
-    from assets_defs.ssdf_lighting.compression import distance_blocks
 
     found = np.empty(axes.shape[:2], np.float32)
     for rows, block in distance_blocks(ssdf_matrix):

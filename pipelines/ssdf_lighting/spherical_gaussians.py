@@ -202,7 +202,7 @@ def visible_table(rows: int = _ROWS, columns: int = _COLUMNS) -> VisibleTable:
 def looked_up(table: VisibleTable, distance: ArrayLike, sharpness: ArrayLike) -> FloatArray:
     """Share of an SG that is visible, f(d, λ) / integral(λ) in [0, 1], float64; broadcast.
 
-    Linear between the entries of the table, as ``lookup_glsl`` does it. Distances in radians,
+    Linear between the entries of the table. Distances in radians,
     beyond pi they count as pi. Raises ValueError as ``visible_integral`` does.
     """
     rows, columns = table.values.shape
@@ -224,45 +224,6 @@ def looked_up(table: VisibleTable, distance: ArrayLike, sharpness: ArrayLike) ->
     lower = (1.0 - along) * values[top + 1, left] + along * values[top + 1, left + 1]
     share = (1.0 - down) * upper + down * lower
     return np.where(angles < 0.0, 1.0 - share, share)
-
-
-def lookup_glsl(name: str) -> str:
-    """GLSL 1.50 of ``float NAME(sampler2D table, float distance, float sharpness)``.
-
-    It does what ``looked_up`` does; its arguments are the table, the distance in radians and the
-    sharpness. The texture has the table's rows as rows, the first one at t = 0 (for
-    ``stage.texture``, whose row 0 is the top: ``values[::-1, :, None]``), and one float a texel,
-    red; its filter and wrapping do not matter. Raises ValueError for a name that is none.
-    """
-    if not (name.isascii() and name.isidentifier()):
-        raise ValueError(f"name is {name!r}; expected a name of GLSL.")
-    return _LOOKUP.replace("NAME", name)
-
-
-_LOOKUP = """
-float NAME(sampler2D table, float edge, float sharpness)
-{
-  const float quarter = 1.57079632679;
-  ivec2 last = textureSize(table, 0) - 1;
-  int knee = 3 * last.y / 4;
-  float away = min(abs(edge), 2.0 * quarter);
-  float k = sqrt(1.0 + max(sharpness, 0.0));
-  float row = away < quarter
-    ? float(knee) * atan(k * away) / atan(k * quarter)
-    : float(knee) + float(last.y - knee) * (away / quarter - 1.0);
-  float column = float(last.x) * (1.0 - 1.0 / k);
-  ivec2 place = clamp(ivec2(column, row), ivec2(0), last - 1);
-  float down = row - float(place.y);
-  float along = column - float(place.x);
-  vec2 left = vec2(
-    texelFetch(table, place, 0).r, texelFetch(table, place + ivec2(0, 1), 0).r);
-  vec2 right = vec2(
-    texelFetch(table, place + ivec2(1, 0), 0).r, texelFetch(table, place + ivec2(1, 1), 0).r);
-  vec2 both = mix(left, right, along);
-  float share = mix(both.x, both.y, down);
-  return edge < 0.0 ? 1.0 - share : share;
-}
-"""
 
 
 def _knee(rows: int) -> int:

@@ -19,13 +19,11 @@ from pipelines.ssdf_lighting.spherical_gaussians import (
     evaluate,
     integral,
     looked_up,
-    lookup_glsl,
     product,
     rotated,
     visible_integral,
     visible_table,
 )
-from pipelines.stage import Camera, Shader, Stage, surface, texture
 
 sharpnesses = st.floats(1e-3, 1e5)
 distances = st.floats(-math.pi, math.pi)
@@ -289,37 +287,3 @@ def test_a_table_too_small_and_a_name_that_is_none_are_refused() -> None:
         visible_table(7, 64)
     with pytest.raises(ValueError, match=r"^columns is 3; expected 4 or more\.$"):
         visible_table(64, 3)
-    with pytest.raises(ValueError, match=r"^name is 'two words'; expected a name of GLSL\.$"):
-        lookup_glsl("two words")
-
-
-def test_the_shader_looks_up_the_same(table: VisibleTable) -> None:
-    """A square whose x is the distance and whose y is the logarithm of the sharpness."""
-    size = 96
-    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
-    shader = Shader(
-        vertex={
-            "TCoord::Dec": "in vec2 place; out vec2 placeOut;",
-            "TCoord::Impl": "placeOut = place;",
-        },
-        fragment={
-            "TCoord::Dec": "in vec2 placeOut;" + lookup_glsl("visibleShare"),
-            "Color::Impl": "//VTK::Color::Impl\n"
-            "diffuseColor = vec3(visibleShare(shares, placeOut.x, exp(placeOut.y)));",
-        },
-    )
-    square = surface(
-        corners,
-        np.array([[0, 1, 2], [0, 2, 3]]),
-        attributes={"place": corners[:, :2] * (3.5, 8.0)},
-        textures={"shares": texture(np.ascontiguousarray(table.values[::-1, :, None]))},
-        shader=shader,
-        lit=False,
-    )
-    with Stage(size, size) as stage:
-        stage.add(square)
-        stage.look(Camera(position=(0, 0, 5), target=(0, 0, 0), up=(0, 1, 0), height=2.0))
-        found = stage.radiance()[::-1, :, 0]
-    centres = (np.arange(size) + 0.5) / size * 2 - 1
-    expected = looked_up(table, centres * 3.5, np.exp(centres * 8.0)[:, None])
-    np.testing.assert_allclose(found, expected, atol=2e-5)
