@@ -217,6 +217,14 @@ def edges(triangles: NDArray[np.int64]) -> Edges:
     return Edges(order, start, uses, begin < end)
 
 
+def edge_ends(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Both vertices (E, 2) of each edge of triangles (F, 3), the lower first; each edge once."""
+    found = edges(triangles.astype(np.int64))
+    half = found.half_edges[found.start]
+    begin, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    return np.sort(np.stack([begin[half], end[half]], axis=-1), axis=1).astype(np.int64)
+
+
 class Sides(NamedTuple):
     """How triangles have to be turned over for all neighbours to agree.
 

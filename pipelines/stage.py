@@ -172,6 +172,19 @@ class Shader:
     fragment: Mapping[str, str] = field(default_factory=dict)
 
 
+PAINTED = Shader(
+    vertex={
+        "TCoord::Dec": "in vec3 shown; out vec3 shownOut;",
+        "TCoord::Impl": "shownOut = shown;",
+    },
+    fragment={
+        "TCoord::Dec": "in vec3 shownOut;",
+        "Color::Impl": "//VTK::Color::Impl\n  ambientColor = shownOut; diffuseColor = vec3(0.0);",
+    },
+)
+"""Shows the attribute ``shown`` (V, 3), linear colours, of a surface that is not lit."""
+
+
 def surface(
     vertices: ArrayLike,
     triangles: ArrayLike,

@@ -85,21 +85,14 @@ def _unused(checked: Checked) -> float:
 
 
 def _compactness(checked: Checked) -> float:
-    """Spread of what was clustered inside the clusters, over that of everything."""
-    import numpy as np
+    from pipelines.ssdf_lighting.triangle_clusters import leading_coordinates, spread_inside
 
-    dataset = checked.dataset
+    dataset, mesh = checked.dataset, checked.input("scene_mesh")
     if checked.record["settings"]["space"] == "positions":
-        features = checked.input("scene_mesh")["vertices"].values
+        features = mesh["vertices"].values
     else:
-        features = dataset["coordinates"].values[:, :32].astype(np.float64)
-    triangles = checked.input("scene_mesh")["triangles"].values
-    points, cluster = features[triangles].mean(axis=1), dataset["cluster"].values
-    sums = np.zeros((cluster.max() + 1, points.shape[1]))
-    np.add.at(sums, cluster, points)
-    means = sums / np.maximum(np.bincount(cluster), 1)[:, None]
-    inside = ((points - means[cluster]) ** 2).sum()
-    return float(np.sqrt(inside / ((points - points.mean(axis=0)) ** 2).sum()))
+        features = leading_coordinates(dataset["coordinates"].values)
+    return spread_inside(features, mesh["triangles"].values, dataset["cluster"].values)
 
 
 def _basis_error(checked: Checked) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipelines.colour import exposure, to_8bit
 from pipelines.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.stage import Camera, Shader, Stage, orbit, surface
+from pipelines.stage import PAINTED, Camera, Stage, orbit, surface
 
 BACKGROUND = (0.02, 0.022, 0.026)
 LIGHT_THETA = math.radians(50.0)
@@ -25,17 +25,6 @@ _HALF_HEIGHT = 0.75
 _FOLD = 0.05
 _MOST_THETA = math.radians(75.0)
 """Goniometers measure so far; beyond, the value there is taken, dimmed with the cosine."""
-
-_SHOWN = Shader(
-    vertex={
-        "TCoord::Dec": "in vec3 shown; out vec3 shownOut;",
-        "TCoord::Impl": "shownOut = shown;",
-    },
-    fragment={
-        "TCoord::Dec": "in vec3 shownOut;",
-        "Color::Impl": "//VTK::Color::Impl\n  ambientColor = shownOut; diffuseColor = vec3(0.0);",
-    },
-)
 
 
 class Panel(NamedTuple):
@@ -144,7 +133,7 @@ def _draw(
                 panel.vertices,
                 panel.triangles,
                 attributes={"shown": values},
-                shader=_SHOWN,
+                shader=PAINTED,
                 lit=False,
             )
         )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.mesh_repair import edge_ends
 from pipelines.ssdf_lighting.distances import NO_EDGE
 from pipelines.ssdf_lighting.octahedral import resolution_of, solid_angles, texel_directions
 from pipelines.ssdf_lighting.visible_edge import delaunay_sides
@@ -140,10 +141,7 @@ def border_step(
     errors (V, D), or any sample of vertices' directions: found minus true. Ratio of the RMS
     difference over edges with ends in two clusters and edges with both in one; 1 is no step.
     """
-    edges = np.sort(
-        np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2), axis=1
-    )
-    edges = np.unique(edges, axis=0)
+    edges = edge_ends(triangles)
     between = cluster[edges[:, 0]] != cluster[edges[:, 1]]
     if between.all() or not between.any():
         return 1.0

@@ -15,7 +15,7 @@ from pipelines.ssdf_lighting.ray_traced import Traced, ray_traced
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
 from pipelines.ssdf_lighting.spherical_gaussians import Lights, rotated
 from pipelines.ssdf_lighting.stage_view import LitActor
-from pipelines.stage import Camera, Shader, Stage, fitting_distance, orbit, surface
+from pipelines.stage import PAINTED, Camera, Stage, fitting_distance, orbit, surface
 
 Progress = Callable[[float], None]
 LookUp = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
@@ -23,17 +23,6 @@ LookUp = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
 
 VIEW_ANGLE = 30.0
 _BACKGROUND = (0.02, 0.02, 0.025)
-
-_PAINTED = Shader(
-    vertex={
-        "TCoord::Dec": "in vec3 shown; out vec3 shownOut;",
-        "TCoord::Impl": "shownOut = shown;",
-    },
-    fragment={
-        "TCoord::Dec": "in vec3 shownOut;",
-        "Color::Impl": "//VTK::Color::Impl\n  ambientColor = shownOut; diffuseColor = vec3(0.0);",
-    },
-)
 
 
 class Turn(NamedTuple):
@@ -143,7 +132,7 @@ def cluster_picture(
         corners,
         np.arange(len(corners)).reshape(-1, 3),
         attributes={"shown": np.repeat(colours[cluster], 3, axis=0) * light[:, None]},
-        shader=_PAINTED,
+        shader=PAINTED,
         lit=False,
     )
     with Stage(*size, background=_BACKGROUND, supersampling=2) as stage:

@@ -4,8 +4,8 @@ Directions miss what is smaller than their texels: a gap between two surfaces, o
 the surface's own horizon, through which a little sky shows. That is rare, but distances are then
 wrong over a wide dark region. So inside dark regions every texel is asked again, at four places; a
 place that sees the sky gets a small loop of its own. (Thin stems before the sky are missed the same
-way. To ask all bright texels again, too, took half as much time again and gained next to nothing
-on the teapot.)
+way. To ask all bright texels again, too, took a third more time and gained next to nothing on the
+teapot.)
 """
 
 from __future__ import annotations

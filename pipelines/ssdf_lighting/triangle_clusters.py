@@ -1,8 +1,8 @@
 """Clusters of triangles: near each other in space, or alike in what they see of the sky.
 
 The paper clusters triangles by their centroids. What is near in space mostly sees alike, but not
-under a lid or at the foot of a wall; clusters of equal size, made of the SSDFs themselves, need a
-third of the vectors for the same error (docs/ssdf.md).
+under a lid or at the foot of a wall; with as many clusters, made of the SSDFs themselves, a vertex
+takes half as many values for the same error (docs/ssdf.md).
 """
 
 from __future__ import annotations
@@ -43,15 +43,30 @@ def clusters_by_distance(
 ) -> Clusters:
     """k-means++ on SSDFs, given by ``coordinates`` (V, R) in the shared basis, strongest first; a
     triangle has the mean of its corners'."""
-    leading = coordinates[:, :_LEADING].astype(np.float64)
-    labels = k_means_plus_plus(leading[triangles].mean(axis=1), count, seed)
-    return Clusters(labels, _nearest(leading, _means(leading[triangles].mean(axis=1), labels)))
+    leading = leading_coordinates(coordinates)
+    points = leading[triangles].mean(axis=1)
+    labels = k_means_plus_plus(points, count, seed)
+    return Clusters(labels, _nearest(leading, _means(points, labels)))
+
+
+def leading_coordinates(coordinates: NDArray[np.float32]) -> NDArray[np.float64]:
+    """What SSDFs are compared by: the first of ``coordinates`` (V, R)."""
+    return coordinates[:, :_LEADING].astype(np.float64)
+
+
+def spread_inside(
+    features: NDArray[np.float64], triangles: NDArray[np.integer], labels: NDArray[np.int32]
+) -> float:
+    """Spread of the triangles' features inside clusters, over that of all; ``features`` (V, k)."""
+    points = features[triangles].mean(axis=1)
+    inside = ((points - _means(points, labels)[labels]) ** 2).sum()
+    return float(np.sqrt(inside / ((points - points.mean(axis=0)) ** 2).sum()))
 
 
 def _means(points: NDArray[np.float64], labels: NDArray[np.int32]) -> NDArray[np.float64]:
     sums = np.zeros((int(labels.max()) + 1, points.shape[1]))
     np.add.at(sums, labels, points)
-    return sums / np.bincount(labels)[:, None]
+    return sums / np.maximum(np.bincount(labels), 1)[:, None]
 
 
 def _nearest(points: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.int32]:

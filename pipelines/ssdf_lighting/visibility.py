@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.mesh_repair import connected, edges
+from pipelines.mesh_repair import connected, edge_ends, edges
 from pipelines.raycasting import first_hits, occluded
 
 if TYPE_CHECKING:
@@ -132,12 +132,10 @@ def stand_ins(
     number = np.arange(len(vertices))
     if not buried.any() or buried.all():
         return number
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    lengths = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
+    sides = edge_ends(triangles)
+    lengths = np.linalg.norm(vertices[sides[:, 0]] - vertices[sides[:, 1]], axis=1)
     size = (len(vertices), len(vertices))
-    # Of a side that two triangles have, both lengths would be summed.
-    sides, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
-    graph = coo_array((lengths[first], (sides[:, 0], sides[:, 1])), shape=size).tocsr()
+    graph = coo_array((lengths, (sides[:, 0], sides[:, 1])), shape=size).tocsr()
     far, _, nearest = dijkstra(
         graph,
         directed=False,
