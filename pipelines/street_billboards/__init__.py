@@ -1,0 +1,1 @@
+"""Streets from eigen-textured billboards (docs/street.md)."""
