@@ -1,11 +1,31 @@
-"""Billboards: what they are (4.1)."""
+"""Billboards: what they are, and how they are laid through points (4.1).
+
+The paper stands a square in the middle of each voxel that turns to face the viewer. Where the
+points of a voxel lie in a plane, a rectangle in that plane shows them with the right parallax and
+its textures fit on each other from all sides, so it stands still here; others turn.
+"""
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pipelines.street_billboards.octree import Leaves, neighbours
+from pipelines.street_billboards.view_directions import CIRCLE, DIRECTIONS, SPACING
+
+OVERLAP = 0.03
+"""By how much a voxel is enlarged on every side, so that neighbours leave no crack."""
+_FLAT = 0.09
+"""Largest deviation from the plane, in voxel sides (root mean square), of points that are flat."""
+_NARROW = 0.13
+"""Least deviation along the plane's shorter direction; those of a pole are narrower."""
+_LIKE_DEGREES, _LIKE_STEP = 25.0, 0.15
+"""Neighbours whose planes differ by less, in angle and in voxel sides, share their points."""
+_LEVEL = 0.8
+"""Vertical part of a unit normal from which on a rectangle has no upright axis."""
 
 
 class Billboards(NamedTuple):
@@ -38,4 +58,173 @@ def turned_axes(
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     row = np.stack([-normal[..., 1], normal[..., 0], np.zeros_like(normal[..., 0])], axis=-1)
     row /= np.maximum(np.linalg.norm(row, axis=-1, keepdims=True), 1e-12)
+    return row, np.cross(normal, row)
+
+
+def laid_through(
+    leaves: Leaves,
+    positions: NDArray[np.floating],
+    viewers: NDArray[np.floating],
+    *,
+    all_turn: bool = False,
+) -> Billboards:
+    """A billboard for each leaf; of two that would show the same plane twice, one.
+
+    positions (n, 3): the points that the leaves hold; viewers (k, 3): where they were seen from, in
+    the order of the drive. all_turn: as in the paper.
+    """
+    middle = leaves.middle
+    towards = _towards_viewers(middle, viewers)
+    turns = np.ones(len(middle), bool)
+    reach = np.float32(np.sqrt(3.0) / 2 * leaves.side * (1 + 2 * OVERLAP))
+    centre = middle.copy()
+    half_s = np.tile(np.array([reach, 0, 0], np.float32), (len(middle), 1))
+    half_t = np.tile(np.array([0, 0, reach], np.float32), (len(middle), 1))
+    kept = np.ones(len(middle), bool)
+    if not all_turn:
+        mean, normal, turns = _planes(leaves, positions)
+        normal *= np.where((normal * towards).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        cut = _cut(mean - middle, normal, leaves.side * (0.5 + OVERLAP))
+        # Their plane left the voxel when it was laid through the neighbours' points as well: it
+        # lies in a neighbour, which shows it.
+        kept = turns | cut.meets
+        still = ~turns & kept
+        centre[still] = (middle + cut.centre)[still]
+        half_s[still], half_t[still] = cut.half_s[still], cut.half_t[still]
+    return Billboards(
+        centre[kept],
+        middle[kept],
+        turns[kept],
+        half_s[kept],
+        half_t[kept],
+        _fans(towards[kept]),
+    )
+
+
+def _towards_viewers(
+    middle: NDArray[np.float64], viewers: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Unit vectors (b, 3) to the middle of the places that look from near."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(viewers).query(middle, k=min(8, len(viewers)))[1].reshape(len(middle), -1)
+    offset = viewers[near].mean(axis=1) - middle
+    return np.asarray(offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-9))
+
+
+def _fans(towards: NDArray[np.float64]) -> NDArray[np.int32]:
+    azimuth = np.degrees(np.arctan2(towards[:, 1], towards[:, 0])) / SPACING
+    return np.mod(np.rint(azimuth - (DIRECTIONS - 1) / 2), CIRCLE).astype(np.int32)
+
+
+# ---- planes ----------------------------------------------------------------------------------
+
+
+class _Moments(NamedTuple):
+    points: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+def _planes(
+    leaves: Leaves, positions: NDArray[np.floating]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Means and normals (b, 3) of the leaves' planes, and which leaves are not flat."""
+    own = _moments(leaves, positions)
+    _, axes = np.linalg.eigh(own.covariance)
+    normal = axes[:, :, 0]
+    # Stereo noise tilts the plane of one voxel: neighbours that agree lend their points.
+    beside = neighbours(leaves.cell)
+    there = np.maximum(beside, 0)
+    like = np.abs(np.einsum("bi,bki->bk", normal, normal[there])) > np.cos(
+        np.radians(_LIKE_DEGREES)
+    )
+    step = np.einsum("bi,bki->bk", normal, own.mean[there] - own.mean[:, None])
+    like &= (np.abs(step) < _LIKE_STEP * leaves.side) & (beside >= 0)
+    joined = _joined(own, there, like)
+    lengths, axes = np.linalg.eigh(joined.covariance)
+    deviations = np.sqrt(np.maximum(lengths, 0.0)) / leaves.side
+    turns = (deviations[:, 0] > _FLAT) | (deviations[:, 1] < _NARROW)
+    return joined.mean, axes[:, :, 0], turns
+
+
+def _moments(leaves: Leaves, positions: NDArray[np.floating]) -> _Moments:
+    rows = np.repeat(np.arange(len(leaves.cell)), np.diff(leaves.first))
+    offsets = positions[leaves.order] - leaves.middle[rows]
+    count = np.diff(leaves.first).astype(np.float64)
+    starts = leaves.first[:-1]
+    mean = np.add.reduceat(offsets, starts) / count[:, None]
+    squares = np.add.reduceat(offsets[:, :, None] * offsets[:, None, :], starts)
+    covariance = squares / count[:, None, None] - mean[:, :, None] * mean[:, None, :]
+    return _Moments(count, mean + leaves.middle, covariance)
+
+
+def _joined(own: _Moments, there: NDArray[np.int64], like: NDArray[np.bool_]) -> _Moments:
+    """Moments of all points of the leaves that are alike, (b, k) rows ``there``."""
+    weight = np.where(like, own.points[there], 0.0)
+    count = weight.sum(axis=1)
+    offset = own.mean[there] - own.mean[:, None]
+    shift = (weight[..., None] * offset).sum(axis=1) / count[:, None]
+    spread = own.covariance[there] + offset[..., :, None] * offset[..., None, :]
+    second = (weight[..., None, None] * spread).sum(axis=1) / count[:, None, None]
+    covariance = second - shift[:, :, None] * shift[:, None, :]
+    return _Moments(count, own.mean + shift, covariance)
+
+
+# ---- a plane in a box ------------------------------------------------------------------------
+
+
+class _Cut(NamedTuple):
+    """The rectangle around the cut of each plane with its box, from the box's middle."""
+
+    meets: NDArray[np.bool_]
+    centre: NDArray[np.float64]
+    half_s: NDArray[np.float32]
+    half_t: NDArray[np.float32]
+
+
+def _cut(point: NDArray[np.float64], normal: NDArray[np.float64], half: float) -> _Cut:
+    """point, normal (b, 3): planes from the middle of boxes of side ``2 * half``."""
+    row, column = plane_axes(normal)
+    corners = np.array(list(itertools.product((-half, half), repeat=3)))
+    edges = [
+        (a, b)
+        for a, b in itertools.combinations(range(8), 2)
+        if np.count_nonzero(corners[a] != corners[b]) == 1
+    ]
+    height = normal @ corners.T - (normal * point).sum(axis=1)[:, None]
+    least = np.full((len(normal), 2), np.inf)
+    most = np.full((len(normal), 2), -np.inf)
+    for a, b in edges:
+        above, below = height[:, a], height[:, b]
+        crossed = (above > 0) != (below > 0)
+        share = np.where(crossed, above / np.where(crossed, above - below, 1.0), 0.0)
+        where = corners[a] + share[:, None] * (corners[b] - corners[a])
+        flat = np.stack([(where * row).sum(axis=1), (where * column).sum(axis=1)], axis=1)
+        least = np.where(crossed[:, None], np.minimum(least, flat), least)
+        most = np.where(crossed[:, None], np.maximum(most, flat), most)
+    meets: NDArray[np.bool_] = np.all(most > least, axis=1)
+    least, most = np.where(meets[:, None], least, 0.0), np.where(meets[:, None], most, 0.0)
+    middle, reach = (least + most) / 2, (most - least) / 2
+    off = (normal * point).sum(axis=1)[:, None] * normal
+    return _Cut(
+        meets,
+        off + middle[:, :1] * row + middle[:, 1:] * column,
+        (reach[:, :1] * row).astype(np.float32),
+        (reach[:, 1:] * column).astype(np.float32),
+    )
+
+
+def plane_axes(
+    normal: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vectors (b, 3) in planes: rows level and to the right as seen against the normal.
+
+    Columns go up. In a plane that is nearly level itself, columns go along x.
+    """
+    level = np.abs(normal[:, 2]) > _LEVEL
+    row = np.cross(np.array([0.0, 0.0, 1.0]), normal)
+    along = np.array([1.0, 0.0, 0.0]) - normal[:, :1] * normal
+    row = np.where(level[:, None], np.cross(along, normal), row)
+    row /= np.maximum(np.linalg.norm(row, axis=1, keepdims=True), 1e-12)
     return row, np.cross(normal, row)
