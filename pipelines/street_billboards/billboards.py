@@ -27,6 +27,9 @@ _LIKE_DEGREES, _LIKE_STEP = 25.0, 0.15
 _LEVEL = 0.8
 """Vertical part of a unit normal from which on a rectangle has no upright axis."""
 
+HEADER_BYTES = 52
+"""Of where a billboard stands, as it is drawn: centre, both halves, fan, whether it turns."""
+
 
 class Billboards(NamedTuple):
     """b rectangles in the world, in metres.

@@ -7,6 +7,7 @@ middle of its cell: s = (2 x + 1) / 32 - 1, t = 1 - (2 y + 1) / 32.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -65,3 +66,12 @@ class CompressedTextures(NamedTuple):
     """(b + 1,), row of the first mask: one a billboard, or one a view."""
     masks: NDArray[np.uint8]
     """(m, 32, 4), alpha, a bit a texel, the leftmost in a byte's highest bit."""
+
+
+def joined(parts: Sequence[ViewTextures]) -> ViewTextures:
+    """One table of several, billboard after billboard."""
+    counts = np.concatenate([np.diff(part.first) for part in parts])
+    return ViewTextures(
+        np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        *(np.concatenate(arrays) for arrays in zip(*(part[1:] for part in parts), strict=True)),
+    )

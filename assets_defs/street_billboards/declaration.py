@@ -1,0 +1,61 @@
+"""The system: drives, and what can be made of them at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from assets_defs.settings import Settings
+from assets_defs.system import Dimension, Source, System
+from storage.readers.drives import read_drive
+from storage.versions import Slot, VersionedStore
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+CITY = "city"
+
+
+def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
+    """Everything but the pixels; then a few frames, whether they show one world."""
+    if source.path is not None:
+        from assets_defs.street_billboards.drive import check_agreement
+
+        check_agreement(read_drive(source.path), source.name)
+
+
+def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    """The bytes of the paper's textures, before any work."""
+    if "drive" in sources and "eigen_textures" in settings:
+        from assets_defs.street_billboards.compression import check_bytes
+
+        check_bytes(sources["drive"], settings)
+
+
+def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
+    """The flight through each street, moving."""
+    return {
+        f"{slot.partition}-flight": store.open(slot)["flight"].values
+        for slot in slots
+        if slot.asset == "street_frames"
+    }
+
+
+STREET = System(
+    name="street_billboards",
+    title="Streets from eigen-textured billboards",
+    dimensions=(
+        Dimension(
+            "drive",
+            builtin=(CITY,),
+            examples=(CITY,),
+            default=CITY,
+            suffixes=(),
+            check=_check_drive,
+            folders=True,
+        ),
+    ),
+    check=_check_together,
+    overview=_overview,
+)
