@@ -362,10 +362,10 @@ class Stage:
     def depth(self) -> NDArray[np.float32]:
         """Distances along the optical axis of what was drawn last, (height, width), scene units.
 
-        Row 0 is at the top; inf where there is no surface. With supersampling it is not averaged:
-        a pixel has the distance of its sample nearest to its middle (with an even number, where four
-        are equally near, of the one to the lower right). From the z-buffer: an error is at most some
-        1e-7 of distance^2 / nearest distance.
+        Row 0 is at the top; inf where there is no surface. With supersampling nothing is averaged:
+        a pixel has the distance of its sample nearest to its middle (with an even number, where
+        four are equally near, of the one to the lower right). Read from the z-buffer: errors are
+        some 1e-7 of distance^2 / the nearest surface's distance.
         """
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray

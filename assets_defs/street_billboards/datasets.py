@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from pipelines.street_billboards.atlases import Page
     from pipelines.street_billboards.billboards import Billboards
+    from pipelines.street_billboards.cameras import Cameras
     from pipelines.street_billboards.point_fusion import FrameViews
     from pipelines.street_billboards.textures import CompressedTextures, ViewTextures
 
@@ -37,6 +38,19 @@ def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> FrameVie
 def _merged(stacked: NDArray[np.generic]) -> NDArray[np.generic]:
     """Frames and cameras as one axis."""
     return stacked.reshape(-1, *stacked.shape[2:])
+
+
+def taken_cameras(drive: xr.Dataset) -> Cameras:
+    """All cameras where they took what is not held out."""
+    import numpy as np
+
+    from pipelines.street_billboards.cameras import Cameras
+
+    poses = drive["poses"].values[~drive["held_out"].values]
+    lenses = np.broadcast_to(drive["intrinsics"].values, (*poses.shape[:2], 3, 3))
+    return Cameras(
+        lenses.reshape(-1, 3, 3), poses.reshape(-1, 4, 4), drive.sizes["x"], drive.sizes["y"]
+    )
 
 
 def viewers(drive: xr.Dataset) -> NDArray[np.float64]:

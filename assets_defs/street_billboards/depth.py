@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
 
+_SKY_FRAMES = 6
+"""Frames that the sky is put together from."""
 
 # ---- depth_maps ------------------------------------------------------------------------------
 
@@ -37,10 +39,15 @@ class DepthSettings(Settings):
 
 
 def _depth_pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.colour import to_8bit
     from pipelines.street_billboards.pictures import depth_picture
 
     middle = dataset.sizes["taken"] // 2
-    return {"depth": depth_picture(dataset["depth"][middle].values)}
+    sky = dataset["sky"].values
+    return {
+        "depth": depth_picture(dataset["depth"][middle].values),
+        "sky": to_8bit(sky[: len(sky) // 2]),
+    }
 
 
 def _stereo_bad(checked: Checked) -> float:
@@ -121,24 +128,35 @@ def depth_maps(
     import xarray as xr
 
     from pipelines.street_billboards import stereo
+    from pipelines.street_billboards.sky import SkyView, sky_map, sky_pixels
 
     taken = np.flatnonzero(~drive_frames["held_out"].values)
     intrinsics, poses = drive_frames["intrinsics"].values, drive_frames["poses"].values
     shape = drive_frames["photographs"].shape[1:4]
     done, lock = [0], threading.Lock()
 
-    def maps_of(frame: int) -> NDArray[np.float32]:
+    def matched(frame: int) -> tuple[list[SkyView], NDArray[np.float32]]:
+        pictures = drive_frames["photographs"][frame].values
         maps = stereo.depth_maps(
-            drive_frames["photographs"][frame].values,
+            pictures,
             intrinsics,
             poses[frame],
             nearest=settings.nearest,
             farthest=settings.farthest,
         )
+        views = map(SkyView, pictures, maps.depth, intrinsics, poses[frame])
+        return list(views), maps.deviation
+
+    some = taken[:: max(len(taken) // _SKY_FRAMES, 1)]
+    sky = sky_map([view for frame in some for view in matched(frame)[0]])
+
+    def maps_of(frame: int) -> NDArray[np.float32]:
+        views, deviation = matched(frame)
+        depth = [np.where(sky_pixels(view), np.inf, view.depth) for view in views]
         with lock:
             done[0] += 1
             progress(done[0] / len(taken))
-        return np.stack([maps.depth, maps.deviation])
+        return np.stack([np.array(depth, np.float32), deviation])
 
     maps = da.stack(
         [
@@ -152,6 +170,7 @@ def depth_maps(
             "depth": (dims, maps[:, 0]),
             "deviation": (dims, maps[:, 1]),
             "frame": (("taken",), taken.astype(np.int64)),
+            "sky": (("row", "column", "channel"), sky),
         }
     )
     return dataset, {"photographs": len(taken) * shape[0]}

@@ -93,7 +93,7 @@ def _shader_difference(checked: Checked) -> float:
     schemas.STREET_FRAMES,
     by=("drive",),
     settings=FrameSettings,
-    inputs=("drive_frames", "billboards", "view_textures", "eigen_textures", "texture_atlases"),
+    inputs=("drive_frames", "depth_maps", "billboards", "eigen_textures", "texture_atlases"),
     kinds=frozenset({"zarr", "pyvista"}),
     pictures=_frame_pictures,
     checks=(
@@ -138,8 +138,8 @@ def street_frames(
     settings: FrameSettings,
     progress: Callable[[float], None],
     drive_frames: xr.Dataset,
+    depth_maps: xr.Dataset,
     billboards: xr.Dataset,
-    view_textures: xr.Dataset,
     eigen_textures: xr.Dataset,
     texture_atlases: xr.Dataset,
 ) -> Result:
@@ -151,7 +151,7 @@ def street_frames(
     from pipelines.street_billboards import figures, frames
 
     made = billboards_of(billboards)
-    sky = view_textures["sky"].values
+    sky = depth_maps["sky"].values
     middle = drive_frames.sizes["camera"] // 2
     intrinsics = drive_frames["intrinsics"].values[middle]
     poses = drive_frames["poses"].values[:, middle]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
@@ -12,6 +12,7 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.street_billboards.datasets import (
     billboards_of,
     frame_views,
+    taken_cameras,
     viewers,
     views_of,
 )
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.sky import SkyView
     from pipelines.street_billboards.view_textures import Photographs
 
     Pictures = dict[str, NDArray[np.uint8]]
@@ -135,7 +135,9 @@ def billboards(
     positions = street_points["positions"].values
     places = viewers(drive_frames)
     leaves = octree_leaves(positions, settings.voxel, settings.least_points)
-    made = laid_through(leaves, positions, places, all_turn=settings.planes == "turning")
+    made = laid_through(
+        leaves, positions, taken_cameras(drive_frames), all_turn=settings.planes == "turning"
+    )
     # In the order of the road, so that the photographs of a tile can be loaded once for all.
     tile = cKDTree(places).query(made.voxel)[1] // TILE_FRAMES
     order = np.argsort(tile, kind="stable")
@@ -173,10 +175,7 @@ class TextureSettings(Settings):
 def _view_pictures(dataset: xr.Dataset) -> Pictures:
     from pipelines.street_billboards.pictures import views_sheet
 
-    from pipelines.colour import to_8bit
-
-    sky = dataset["sky"].values
-    return {"views": views_sheet(views_of(dataset)), "sky": to_8bit(sky[: len(sky) // 2])}
+    return {"views": views_sheet(views_of(dataset))}
 
 
 def _seen_share(checked: Checked) -> float:
@@ -251,13 +250,12 @@ def view_textures(
     street_points: xr.Dataset,
     billboards: xr.Dataset,
 ) -> Result:
-    """Sample the billboards' textures, tile of the road by tile; and the sky behind them."""
+    """Sample the billboards' textures, tile of the road by tile."""
     import numpy as np
     import xarray as xr
 
     from pipelines.street_billboards import view_textures as sampling
     from pipelines.street_billboards.billboards import Billboards
-    from pipelines.street_billboards.sky import sky_map
     from pipelines.street_billboards.textures import joined
 
     made, tiles = billboards_of(billboards), billboards["tile"].values
@@ -286,7 +284,6 @@ def view_textures(
             )
         )
     views = joined(parts)
-    sky = sky_map(_sky_views(drive_frames, depth_maps, street_points))
     dataset = xr.Dataset(
         {
             "first": (("billboard_end",), views.first),
@@ -294,7 +291,6 @@ def view_textures(
             "colours": (("view", "v", "u", "channel"), views.colours),
             "states": (("view", "v", "u"), views.states),
             "sharpness": (("view",), views.sharpness),
-            "sky": (("row", "column", "channel"), sky),
         }
     )
     return dataset, {
@@ -333,27 +329,3 @@ def _photographs(
     return Photographs(
         views.photographs, depth, deviation, views.intrinsics, views.poses, _codes(points, frames)
     )
-
-
-def _sky_views(drive: xr.Dataset, depths: xr.Dataset, points: xr.Dataset) -> Iterator[SkyView]:
-    """The middle camera's photographs, some of them."""
-    import numpy as np
-
-    from pipelines.street_billboards.sky import SkyView
-    from pipelines.street_billboards.surface_depth import surface_depth
-
-    frames = depths["frame"].values
-    middle = drive.sizes["camera"] // 2
-    positions = points["positions"].values
-    height, width = drive.sizes["y"], drive.sizes["x"]
-    intrinsics = drive["intrinsics"].values[middle]
-    for number in range(0, len(frames), max(len(frames) // 8, 1)):
-        pose = drive["poses"].values[frames[number], middle]
-        surface = surface_depth(positions, 0.3, intrinsics, pose, width, height, farthest=np.inf)
-        yield SkyView(
-            drive["photographs"][frames[number], middle].values,
-            surface,
-            intrinsics,
-            pose,
-            points["gains"].values[number, middle],
-        )

@@ -20,9 +20,10 @@ four planes, 128 (a weight of zero) for planes of others.
 **masks** (RGBA8): a mask is 32 texels in a row of the texture, from the top of the mask down: a row
 of it each, 32 bits, the leftmost in the red byte's highest bit.
 
-**records** (float32, integers below 2^24): two texels a billboard,
-(first texel in views, first mask, directions 0 to 15 and 16 to 31 as bits) and (first tile in
-detail, first tile in tint, d + 64 t, channel 2's first slot counted from the first tile in tint).
+**records** (float32, integers below 2^24): two texels a billboard, (first texel in views, first
+mask, directions 0 to 15 and 16 to 31 as bits) and (first tile in detail, first tile in tint,
+d + 64 t + 4096 (1 for a mask a view) + 8192 (1 for Y, Co, Cg), channel 2's first slot counted from
+the first tile in tint).
 """
 
 from __future__ import annotations
@@ -71,6 +72,17 @@ class Page(NamedTuple):
     """Bytes that stand for something."""
     padding: int
     """Bytes of textures that stand for nothing."""
+
+    @property
+    def flags(self) -> NDArray[np.int64]:
+        """(p, 2): whether there is a mask a view; whether channels are Y, Co, Cg."""
+        codes = self.records[:, 1, 2].astype(np.int64)
+        return np.column_stack([codes >> 12 & 1, codes >> 13 & 1])
+
+    @property
+    def has_views(self) -> NDArray[np.bool_]:
+        """(p,): whether there is something to show."""
+        return np.asarray(self.records[:, 0, 2:].any(axis=1))
 
 
 class _Plan(NamedTuple):
@@ -241,7 +253,9 @@ def _packed(textures: CompressedTextures, plan: _Plan) -> Page:
     records[:, 0, 2:] = _direction_bits(textures, plan)
     records[:, 1, 0] = plan.detail // 4
     records[:, 1, 1] = plan.tint // 4
-    records[:, 1, 2] = plan.detail_tiles + 64 * plan.tint_tiles
+    many = np.diff(textures.first_mask)[plan.start : plan.stop] > 1
+    records[:, 1, 2] = plan.detail_tiles + 64 * plan.tint_tiles + 4096 * many
+    records[:, 1, 2] += 8192 * (textures.colour == "ycocg")
     records[:, 1, 3] = plan.tint % 4 + ranks[:, 1]
     used = sum(
         planes * (side**2 + 4)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.cameras import Cameras, projected
 from pipelines.street_billboards.octree import Leaves, neighbours
 from pipelines.street_billboards.view_directions import CIRCLE, DIRECTIONS, SPACING
 
@@ -24,6 +25,8 @@ _NARROW = 0.13
 """Least deviation along the plane's shorter direction; those of a pole are narrower."""
 _LIKE_DEGREES, _LIKE_STEP = 25.0, 0.15
 """Neighbours whose planes differ by less, in angle and in voxel sides, share their points."""
+_NEAREST = 1.0
+"""Metres; a camera that is nearer counts no more."""
 _LEVEL = 0.8
 """Vertical part of a unit normal from which on a rectangle has no upright axis."""
 
@@ -67,17 +70,17 @@ def turned_axes(
 def laid_through(
     leaves: Leaves,
     positions: NDArray[np.floating],
-    viewers: NDArray[np.floating],
+    cameras: Cameras,
     *,
     all_turn: bool = False,
 ) -> Billboards:
     """A billboard for each leaf; of two that would show the same plane twice, one.
 
-    positions (n, 3): the points that the leaves hold; viewers (k, 3): where they were seen from, in
-    the order of the drive. all_turn: as in the paper.
+    positions (n, 3): the points that the leaves hold; cameras: that saw them. all_turn: as in the
+    paper.
     """
     middle = leaves.middle
-    towards = _towards_viewers(middle, viewers)
+    towards = _towards_viewers(middle, cameras)
     turns = np.ones(len(middle), bool)
     reach = np.float32(np.sqrt(3.0) / 2 * leaves.side * (1 + 2 * OVERLAP))
     centre = middle.copy()
@@ -104,15 +107,20 @@ def laid_through(
     )
 
 
-def _towards_viewers(
-    middle: NDArray[np.float64], viewers: NDArray[np.floating]
-) -> NDArray[np.float64]:
-    """Unit vectors (b, 3) to the middle of the places that look from near."""
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(viewers).query(middle, k=min(8, len(viewers)))[1].reshape(len(middle), -1)
-    offset = viewers[near].mean(axis=1) - middle
-    return np.asarray(offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-9))
+def _towards_viewers(middle: NDArray[np.float64], cameras: Cameras) -> NDArray[np.float64]:
+    """Unit vectors (b, 3) to the cameras that have it in their picture, the near ones above all."""
+    total = np.zeros_like(middle)
+    for intrinsics, to_world in zip(cameras.intrinsics, cameras.to_world, strict=True):
+        pixels, depth = projected(intrinsics, to_world, middle)
+        offset = to_world[:3, 3] - middle
+        away = np.maximum(np.linalg.norm(offset, axis=1), _NEAREST)
+        with np.errstate(invalid="ignore"):
+            shown = (depth > 0) & (pixels >= 0).all(axis=1)
+            shown &= (pixels[:, 0] < cameras.width) & (pixels[:, 1] < cameras.height)
+        # One that nobody has in the picture still has a side that faces the road.
+        weight = np.where(shown, 1.0, 1e-6) / away**2
+        total += weight[:, None] * offset / away[:, None]
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))
 
 
 def _fans(towards: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -31,7 +31,8 @@ __all__ = ["BEFORE", "BEYOND", "MATERIALS", "City", "city"]
 BEFORE, BEYOND = 10.0, 40.0
 """Metres of street before the first camera and beyond the last."""
 _BAY = 11.5
-_ROAD, _KERB, _PAVEMENT, _POLE, _PARKED = 3.5, 0.12, 7.9, 4.2, 3.7
+_ROAD, _KERB, _PAVEMENT, _POLE, _PARKED = 3.5, 0.12, 7.9, 4.2, 3.8
+_MIRRORED = np.array([1.0, -1.0, 1.0], np.float32)
 # What the generators' seeds are told apart by.
 _HOUSES, _BAYS, _SURFACE = 1, 2, 3
 
@@ -145,8 +146,8 @@ def _furniture(side: int, start: float, end: float, seed: int) -> list[Part]:
         post = pole(generator)
         if side == 1:  # the plate still faces those who come
             post = post._replace(
-                vertices=post.vertices * np.float32([1, -1, 1]),
-                normals=post.normals * np.float32([1, -1, 1]),
+                vertices=post.vertices * _MIRRORED,
+                normals=post.normals * _MIRRORED,
                 triangles=post.triangles[:, ::-1],
             )
         parts.append(placed(post, (x, sign * _POLE, _KERB)))

@@ -70,13 +70,12 @@ _BELT = 4
 
 def _ring(wide: float, belt: float, top: float, top_wide: float) -> np.ndarray:
     """Outline (y, z) of a cross-section over the top, from the right sill to the left."""
+    shoulder = top - min(0.05, 0.5 * (top - belt))
     half = np.array([
-        [0.86 * wide, 0.22], [0.97 * wide, 0.30], [wide, 0.55], [0.99 * wide, belt - 0.08],
-        [0.95 * wide, belt], [top_wide + 0.02, top - 0.05], [0.85 * top_wide, top],
-        [0.45 * top_wide, top + 0.01],
+        [0.86 * wide, 0.22], [0.97 * wide, 0.30], [wide, 0.5 * (belt + 0.22)],
+        [0.99 * wide, belt - 0.08], [0.95 * wide, belt], [top_wide + 0.02, shoulder],
+        [0.85 * top_wide, top], [0.45 * top_wide, top + 0.01],
     ])  # fmt: skip
-    half[:, 1] = np.minimum(half[:, 1], top + 0.01)
-    half[1:5, 1] = np.minimum(half[1:5, 1], [0.3, 0.45 + 0.1 * (belt > 0.7), belt - 0.08, belt])
     return np.concatenate([half * [-1, 1], half[::-1]])
 
 

@@ -1,7 +1,7 @@
 """Fronts of houses: walls with recessed windows, doors, shops, cornices; walls that close gaps.
 
-A front is built in its own frame: x to the right from 0 to its width, y = 0 the wall, -y the street,
-z up from the pavement.
+A front is built in its own frame: x to the right from 0 to its width, y = 0 the wall, -y the
+street, z up from the pavement.
 """
 
 from __future__ import annotations
@@ -46,7 +46,9 @@ _DEPTH_OF_HOUSE = 8.0
 
 def _one_of(generator: Generator, choices: tuple[Colour, ...]) -> Colour:
     colour = np.asarray(choices[generator.integers(len(choices))])
-    r, g, b = np.clip(colour * generator.uniform(0.85, 1.15) + generator.normal(0, 0.01, 3), 0.02, 1)
+    r, g, b = np.clip(
+        colour * generator.uniform(0.85, 1.15) + generator.normal(0, 0.01, 3), 0.02, 1
+    )
     return float(r), float(g), float(b)
 
 
@@ -110,7 +112,7 @@ def _body(width: float, height: float, wall: Look, generator: Generator) -> Part
     else:
         flat = Look("asphalt", (0.2, 0.2, 0.2))
         parts.append(panel((0, 0, height), (width, 0, 0), (0, deep, 0), flat, longest=4.0))
-        parapet = box((0, -0.05, height), (width, 0.25, height + 0.5), wall, faces="-y+y+z")
+        parapet = box((0, -0.05, height), (width, 0.25, height + 0.5), wall, faces="-x+x-y+y+z")
         parts.append(parapet)
     return joined(parts)
 
@@ -132,10 +134,8 @@ def _upper_floors(
     lefts = (np.arange(count) + 0.5) * cell - opening / 2
     bottoms = ground + np.arange(floors) * storey + 0.85
     xs = np.concatenate([[0.0], np.stack([lefts, lefts + opening], axis=1).ravel(), [width]])
-    zs = np.concatenate(
-        [[ground], np.stack([bottoms, bottoms + tall], axis=1).ravel()]
-        + [[ground + floors * storey + 0.5]]
-    )
+    heights = np.stack([bottoms, bottoms + tall], axis=1).ravel()
+    zs = np.concatenate([[ground], heights, [ground + floors * storey + 0.5]])
     holes = np.zeros((len(zs) - 1, len(xs) - 1), np.bool_)
     holes[1::2, 1::2] = True
     x, z = np.meshgrid(lefts, bottoms)
@@ -157,7 +157,7 @@ def _upper_floors(
 def window(
     width: float, height: float, trim: Look, frame: Look, *, style: int = 0, lit: float = 1.0
 ) -> Part:
-    """What fills a hole in a wall from the origin up: reveals, a frame with bars, a pane, a sill."""
+    """What fills a hole in a wall, from the origin up: reveals, frame, pane, sill."""
     depth = 0.18
     pane = Look("interior", (lit, lit, 0.95 * lit), gloss=1.0)
     parts = [
@@ -336,6 +336,6 @@ def gap_wall(width: float, generator: Generator) -> Part:
         corner = ((width - wide) / 2, -0.04, 0.7)
         parts.append(panel(corner, (wide, 0, 0), (0, 0, 1.2), picture, fitted=True))
         edge = Look("metal", (0.1, 0.1, 0.1))
-        low = np.array(corner) + [-0.05, 0.015, -0.05]
-        parts.append(box(low, low + [wide + 0.1, 0.025, 1.3], edge, faces="-x+x-y-z+z"))
+        left, right = corner[0] - 0.05, corner[0] + wide + 0.05
+        parts.append(box((left, -0.025, 0.65), (right, 0, 1.95), edge, faces="-x+x-y-z+z"))
     return joined(parts)

@@ -16,7 +16,7 @@ Image = NDArray[np.float32]
 
 # Corners in brick.png, turned by a quarter: from mortar to mortar, eleven courses; left to right,
 # about 4.6 bricks. In pixels: top left, top right, bottom right, bottom left.
-_BRICKS = np.float32([[0, 112], [511, 42.5], [511, 504], [0, 442.5]])
+_BRICKS = np.array([[0, 112], [511, 42.5], [511, 504], [0, 442.5]], np.float32)
 
 
 def city_textures(
@@ -25,9 +25,9 @@ def city_textures(
     """Textures of MATERIALS by name, (height, width, 3) uint8 sRGB, and ``"stains"``.
 
     photographs: (height, width, 3) uint8 sRGB: brick, gravel, grass, coffee, moon, coins, page,
-    motorcycle_left, astronaut, chelsea, rocket. Those that repeat have a mean of MEAN_TEXEL in linear
-    light; stains, which every surface is multiplied by at a larger scale, too. Raises ValueError
-    where a photograph is missing.
+    motorcycle_left, astronaut, chelsea, rocket. Those that repeat have a mean of MEAN_TEXEL in
+    linear light, and so have stains, which every surface is multiplied by at a larger scale. Raises
+    ValueError where a photograph is missing.
     """
     needed = {"brick", "gravel", "grass", "coffee", "moon", "coins", "page", "motorcycle_left"}
     needed |= {"astronaut", "chelsea", "rocket"}
@@ -39,7 +39,7 @@ def city_textures(
     moon = repeatable(evened(light["moon"][:400]))
     bricks = _bricks(light["brick"])
     linear = {
-        "brick": bricks * np.float32([1.0, 1.0, 1.0]),
+        "brick": bricks,
         "plaster": _contrast(gravel, 0.35) * _contrast(grass, 0.25),
         "asphalt": _contrast(gravel, 0.8),
         "paving": _contrast(bricks.mean(axis=2, keepdims=True), 0.8) * _contrast(gravel, 0.35),
@@ -95,14 +95,14 @@ def _contrast(image: Image, factor: float) -> Image:
 def _bricks(photograph: Image) -> Image:
     """Eleven courses, straight, bricks and mortar of their own colours."""
     turned = np.rot90(photograph)
-    square = np.float32([[0, 0], [_SIDE, 0], [_SIDE, _SIDE], [0, _SIDE]])
+    square = np.array([[0, 0], [_SIDE, 0], [_SIDE, _SIDE], [0, _SIDE]], np.float32)
     straight = cv2.warpPerspective(
         np.ascontiguousarray(turned),
         cv2.getPerspectiveTransform(_BRICKS, square),
         (_SIDE, _SIDE),
         flags=cv2.INTER_AREA,
     )
-    level = evened(straight, 90.0)
+    level = evened(straight.astype(np.float32), 90.0)
     grey = level.mean(axis=2, keepdims=True)
     dark, bright = np.quantile(grey, [0.3, 0.93])
     mortar = np.clip((grey - dark) / (bright - dark), 0.0, 1.0)
@@ -114,8 +114,8 @@ def _bricks(photograph: Image) -> Image:
         tones[rows[:, None], shifted.astype(int)].astype(np.float32), (0, 0), 3.0
     )
     fine = grey / cv2.GaussianBlur(grey, (0, 0), 2.0)[..., None]
-    brick = np.float32([1.0, 0.55, 0.42]) * tone[..., None] * fine**2
-    coloured = brick * (1 - mortar) + np.float32([0.95, 0.9, 0.85]) * mortar
+    brick = np.array([1.0, 0.55, 0.42], np.float32) * tone[..., None] * fine**2
+    coloured = brick * (1 - mortar) + np.array([0.95, 0.9, 0.85], np.float32) * mortar
     return (coloured / coloured.mean()).astype(np.float32)
 
 

@@ -6,6 +6,7 @@ columns run to the right as seen from outside.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -149,7 +150,7 @@ def grid(
         vertices=points.reshape(-1, 3)[used].astype(np.float32),
         normals=normals.reshape(-1, 3)[used].astype(np.float32),
         uvs=uvs.reshape(-1, 2)[used].astype(np.float32),
-        tint=np.tile(np.float32(look.albedo) * np.float32(scale), (len(used), 1)),
+        tint=np.tile(np.array(look.albedo, np.float32) * np.float32(scale), (len(used), 1)),
         gloss=np.full(len(used), look.gloss, np.float32),
         triangles=triangles.astype(np.int32),
         material=np.full(count, MATERIALS.index(look.material), np.int32),
@@ -161,7 +162,7 @@ def refined(lines: Sequence[float] | FloatArray, longest: float = _LONGEST_EDGE)
     """Rising positions with others put between them, so that no step is longer than ``longest``."""
     steps = [
         np.linspace(a, b, max(1, math.ceil((b - a) / longest - 1e-6)), endpoint=False)
-        for a, b in zip(lines[:-1], lines[1:], strict=True)
+        for a, b in itertools.pairwise(lines)
     ]
     return np.append(np.concatenate(steps), lines[-1])
 
@@ -194,7 +195,10 @@ def panel(
 
 
 def wall_with_holes(
-    columns: Sequence[float], rows: Sequence[float], holes: NDArray[np.bool_], look: Look
+    columns: Sequence[float] | FloatArray,
+    rows: Sequence[float] | FloatArray,
+    holes: NDArray[np.bool_],
+    look: Look,
 ) -> Part:
     """A wall in the plane y = 0 that is seen from -y, without the cells ``holes``.
 
@@ -214,7 +218,12 @@ def wall_with_holes(
 
 
 def box(
-    low: ArrayLike, high: ArrayLike, look: Look, *, faces: str = "-x+x-y+y-z+z", longest: float = 1.0
+    low: ArrayLike,
+    high: ArrayLike,
+    look: Look,
+    *,
+    faces: str = "-x+x-y+y-z+z",
+    longest: float = 1.0,
 ) -> Part:
     """An upright box from its lowest to its highest corner; ``faces`` names those that exist."""
     a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)

@@ -45,9 +45,9 @@ def street_elevations(city: City, light: NDArray[np.floating]) -> Elevations:
         picture = np.zeros((len(z), len(x), 4), np.float32)
         picture[z < 0.02] = (*_ROAD, 1.0)
         above = z >= 0.02
-        points = np.stack(
-            np.broadcast_arrays(x[None], 0.0, z[above][:, None]), axis=-1
-        ).reshape(-1, 3)
+        points = np.stack(np.broadcast_arrays(x[None], 0.0, z[above][:, None]), axis=-1).reshape(
+            -1, 3
+        )
         hits = first_hits(scene, points, np.array([0.0, side, 0.0]))
         found = hits.triangle >= 0
         triangle, weights = hits.triangle[found], hits.barycentric[found]
@@ -58,9 +58,7 @@ def street_elevations(city: City, light: NDArray[np.floating]) -> Elevations:
         seen[found, 3] = 1.0
         picture[above] = seen.reshape(-1, len(x), 4)
         halves.append(picture)
-    return Elevations(
-        np.concatenate(halves), (start, low), (len(x) * _STEP, len(z) * _STEP)
-    )
+    return Elevations(np.concatenate(halves), (start, low), (len(x) * _STEP, len(z) * _STEP))
 
 
 def reflection_glsl(elevations: Elevations) -> str:

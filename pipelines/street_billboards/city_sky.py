@@ -19,9 +19,10 @@ def overcast_sky(height: int) -> NDArray[np.float32]:
     plane = direction[..., :2] / (up + 0.18)[..., None]
     cover = _sampled(_cloud_layer(), plane * 0.16)
     thick = np.clip((cover - 0.35) * 1.6, 0.0, 1.0)[..., None]
-    bright = np.array([1.12, 1.12, 1.12]) * (1.0 - 0.35 * _sampled(_cloud_layer(), plane * 0.31))[
-        ..., None
-    ]
+    bright = (
+        np.array([1.12, 1.12, 1.12])
+        * (1.0 - 0.35 * _sampled(_cloud_layer(), plane * 0.31))[..., None]
+    )
     fade = np.clip(up * 6.0, 0.0, 1.0)[..., None]
     sky = base + fade * thick * (bright - base)
     return sky.astype(np.float32)

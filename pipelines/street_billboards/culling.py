@@ -1,7 +1,7 @@
 """Which billboards a camera can see: rectangles against the five planes of its view, in order.
 
 The planes are those through the picture's edges (the outer edges of its pixels) and the one at
-``NEAR``. A rectangle is left out where it lies behind one of them as a whole, so none that shows is.
+``NEAR``. A rectangle is left out where it lies behind one of them as a whole: what shows never is.
 """
 
 from __future__ import annotations

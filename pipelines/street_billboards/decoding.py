@@ -1,7 +1,8 @@
 """Eigen-textures decoded on the CPU, for viewers anywhere (Eq. 1), as the shader does it.
 
-Between two stored views, weights and means are interpolated: Eq. 1 is linear in them, so that is the
-interpolation of the views. The paper compares drawing frames with this to decoding in the shader.
+Between two stored views, weights and means are interpolated: Eq. 1 is linear in them, so that is
+the interpolation of the views. The paper compares drawing frames with this to decoding in the
+shader.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ def decodable(textures: CompressedTextures) -> Decodable:
     """What the kernels read; make it once for many frames."""
     views = np.diff(textures.first)
     ranks = textures.ranks.astype(np.int64)
-    planes = [_starts(ranks[:, c]) for c in range(3)]
-    weights = [_starts(ranks[:, c] * views) for c in range(3)]
+    planes = [starts(ranks[:, c]) for c in range(3)]
+    weights = [starts(ranks[:, c] * views) for c in range(3)]
     return Decodable(
         textures.colour == "ycocg",
         textures.first,
@@ -62,7 +63,8 @@ def decodable(textures: CompressedTextures) -> Decodable:
     )
 
 
-def _starts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def starts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(b + 1,): where each of groups of so many (b,) begins."""
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)])
 
 
@@ -75,9 +77,9 @@ def decoded_views(
     """Textures of k billboards as their viewers see them, into ``out`` (k, 32, 32, 4) uint8.
 
     billboards (k,): rows; position (k,): where the viewer stands in each one's fan, as
-    ``fan_position`` says. Channels are R, G, B, rounded, and alpha, 0 or 255: of the mask, or of two
-    views' masks interpolated like the colours, opaque from one half on. A billboard without a view
-    is transparent.
+    ``fan_position`` says. Channels are R, G, B, rounded, and alpha, 0 or 255: of the mask, or of
+    two views' masks interpolated like the colours, opaque from one half on. A billboard without a
+    view is transparent.
     """
     data = textures if isinstance(textures, Decodable) else decodable(textures)
     _decode_many(data, billboards.astype(np.int64), position.astype(np.float64), out)

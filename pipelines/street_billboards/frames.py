@@ -12,6 +12,7 @@ from pipelines.colour import to_8bit
 from pipelines.stage import Stage
 from pipelines.street_billboards.atlases import Page
 from pipelines.street_billboards.billboards import Billboards
+from pipelines.street_billboards.sky import rays_of, sky_along
 from pipelines.street_billboards.stage_view import CpuStreet, Street, stage_camera
 from pipelines.street_billboards.textures import CompressedTextures
 
@@ -71,33 +72,8 @@ class StreetStage:
         self._stage.look(stage_camera(intrinsics, to_world, height))
         drawn = self._stage.radiance()
         alone, covered = drawn[..., :3], drawn[..., 3]
-        behind = sky_behind(self._sky, intrinsics, to_world, width, height)
+        behind = sky_along(self._sky, rays_of(intrinsics, to_world, width, height))
         return View(alone, alone + (1 - covered[..., None]) * behind, covered, sent)
-
-
-def sky_behind(
-    sky: NDArray[np.float32], intrinsics: FloatArray, to_world: FloatArray, width: int, height: int
-) -> NDArray[np.float32]:
-    """Radiance (height, width, 3) of the sky alone, interpolated."""
-    import cv2
-
-    from pipelines.street_billboards.cameras import points_at
-
-    rays = points_at(intrinsics, to_world, np.ones((height, width))) - to_world[:3, 3]
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    rows, columns = sky.shape[:2]
-    across = (0.5 - np.arctan2(rays[..., 1], rays[..., 0]) / (2 * np.pi)) * columns - 0.5
-    down = np.arccos(np.clip(rays[..., 2], -1, 1)) / np.pi * rows - 0.5
-    wide = np.concatenate([sky[:, -1:], sky, sky[:, :1]], axis=1)
-    return np.asarray(
-        cv2.remap(
-            wide,
-            np.mod(across, columns).astype(np.float32) + 1.0,
-            np.clip(down, 0, rows - 1).astype(np.float32),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-    )
 
 
 def moved(pose: FloatArray, offset: float) -> FloatArray:

@@ -5,10 +5,10 @@ them part of the picture, so only seen texels count: the start is an SVD of the 
 the other views fill, then images and weights are solved for in turn, each by least squares.
 
 Two small ridges decide what the seen texels leave open. Images are kept at a root mean square of 1,
-so that w is an amplitude in codes: a component's value at a texel pays ``ridge`` (codes²) times its
-square, as in probabilistic PCA, so weak components say little where few views looked. A view's
-weights are drawn to the mean of all views' weights as if by ``_PULL`` texels: a view that saw hardly
-anything looks like the others.
+so that w is an amplitude in codes: a component's value at a texel pays ``ridge`` (codes²) times
+its square, as in probabilistic PCA, so weak components say little where few views looked. A view's
+weights are drawn to the mean of all views' weights as if by ``_PULL`` texels: a view that saw
+hardly anything looks like the others.
 
 Loops run along texels inside, so that they become vector instructions: a billboard has five views
 and a thousand texels.
@@ -118,7 +118,7 @@ def started(
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _centre(values: FloatArray, counted: FloatArray, middle: FloatArray, means: FloatArray) -> None:
-    """Views' means beyond the texels' ``middle``; views that saw nothing get the mean of the rest."""
+    """Views' means beyond the texels' ``middle``; the mean of these for views that saw nothing."""
     views, texels = values.shape
     known = 0
     mean = np.float32(0.0)

@@ -1,8 +1,8 @@
 """Photographs of the built-in city: linear radiance, depth, and which pixels show thin poles.
 
 Matt surfaces reflect what of the sky their vertices see (``City.sky_visibility``) and a constant
-share of the rest. Panes and paint add what they mirror: the sky, or, under the skyline, the houses of
-the street and the road, by Schlick's approximation of Fresnel's reflectance.
+share of the rest. Panes and paint add what they mirror, the sky, the houses across the street or
+the road, by Schlick's approximation of Fresnel's reflectance.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from pipelines.street_billboards.city_sky import overcast_sky
 
 _CHUNK = 20.0
 """Metres of road to an actor."""
-_FARTHEST = 130.0
+_FARTHEST = 600.0
 """Metres ahead that are drawn, where the street is longer."""
-_SKY = np.float32([1.30, 1.37, 1.46])
+_SKY = np.array([1.30, 1.37, 1.46], np.float32)
 """Light of the whole sky. It is drawn darker than that, as if exposed for the street."""
-_BOUNCE = np.float32([0.36, 0.345, 0.33])
-
-
+_BOUNCE = np.array([0.36, 0.345, 0.33], np.float32)
 _UNSTAINED = tuple(MATERIALS.index(name) for name in (*POSTERS, "page", "interior", "shop"))
+_SHARPER = -0.75
+"""Bias of the level of mipmaps: isotropic ones are too blurred along the road."""
 
 
 class Shot(NamedTuple):
@@ -44,7 +44,7 @@ class Shot(NamedTuple):
     radiance: NDArray[np.float32]
     """(h, w, 3), linear."""
     depth: NDArray[np.float32]
-    """(h, w), metres along the optical axis at the pixel's middle, inf: sky; (0, 0) without labels."""
+    """(h, w), metres along the axis at the pixel's middle, inf: sky; (0, 0) without labels."""
     pole: NDArray[np.bool_]
     """(h, w), a thin pole is at the pixel's middle; (0, 0) without labels."""
 
@@ -71,7 +71,7 @@ class CityStage:
         self._stage = Stage(width, height, background=sky, supersampling=supersampling)
         self._label_stage: Stage | None = None
         self._drawn = _Chunks(city, city.material * 2 + _glossy(city))
-        textures = {name: _repeated(name, image) for name, image in images.items()}
+        textures = {name: _repeated(image) for name, image in images.items()}
         light = city.sky_visibility[:, None] * (_SKY - _BOUNCE) + _BOUNCE
         elevations = street_elevations(city, light)
         mirrored = {"elevations": texture(elevations.picture), "sky": texture(sky)}
@@ -88,7 +88,9 @@ class CityStage:
                 part.triangles,
                 attributes={name: values[part.vertices] for name, values in attributes.items()},
                 textures=samplers,
-                shader=_shader(elevations if has_gloss else None, stained=material not in _UNSTAINED),
+                shader=_shader(
+                    elevations if has_gloss else None, stained=material not in _UNSTAINED
+                ),
                 lit=False,
             )
             actor.GetProperty().BackfaceCullingOn()
@@ -159,8 +161,8 @@ class CityStage:
             intrinsics[:2, 2], middle, atol=1e-3
         ):
             raise ValueError(
-                f"intrinsics: found focal lengths {intrinsics[0, 0]}, {focal} and the principal point "
-                f"{intrinsics[:2, 2].tolist()}; expected square pixels and {middle}."
+                f"intrinsics: found focal lengths {intrinsics[0, 0]}, {focal} and the principal "
+                f"point {intrinsics[:2, 2].tolist()}; expected square pixels and {middle}."
             )
         eye = to_world[:3, 3]
         target, up = eye + to_world[:3, 2], -to_world[:3, 1]
@@ -203,7 +205,7 @@ class _Chunks:
         ]
 
     def show_ahead(self, x: float, forward: float) -> None:
-        """Draw only what a camera at x may see that looks along +x (forward > 0.5), or all round."""
+        """Draw what a camera at x may see, whose view has ``forward`` along x, -1 to 1."""
         back = 3.0 if forward > 0.5 else _FARTHEST
         ahead = 3.0 if forward < -0.5 else _FARTHEST
         for part in self.parts:
@@ -214,10 +216,11 @@ def _glossy(city: City) -> NDArray[np.int32]:
     return (city.gloss[city.triangles[:, 0]] > 0).astype(np.int32)
 
 
-def _repeated(name: str, image: NDArray[np.uint8]) -> Any:
+def _repeated(image: NDArray[np.uint8]) -> Any:
     made = texture(image, wrap="repeat", mipmap=True, srgb=True)
-    # VTK's 4 takes more than half of a picture's time in software.
-    made.SetMaximumAnisotropicFiltering(1.0 if name == "stains" else 2.0)
+    # VTK's 4 takes more than half of a picture's time in Mesa's llvmpipe, and 16 s where a surface
+    # is seen at a very grazing angle: instead, the shader takes sharper levels (_SHARPER).
+    made.SetMaximumAnisotropicFiltering(1.0)
     return made
 
 
@@ -229,7 +232,8 @@ def _shader(mirrored: Elevations | None, *, stained: bool) -> Shader:
     passed = "uvOut = uv; litOut = lit;"
     taken = "in vec2 uvOut; in vec3 litOut;"
     stains = " * (texture(stains, uvOut * 0.137).r * 2.5)" if stained else ""
-    code = f"//VTK::Color::Impl\n  vec3 seen = texture(picture, uvOut).rgb * litOut{stains};\n"
+    code = "//VTK::Color::Impl\n"
+    code += f"  vec3 seen = texture(picture, uvOut, {_SHARPER}).rgb * litOut{stains};\n"
     if mirrored is not None:
         declared += (
             " in vec3 shading; in float gloss; out vec3 shadingOut; out float glossOut;"

@@ -14,6 +14,8 @@ from pipelines.street_billboards.textures import SIDE
 
 FloatArray = NDArray[np.float32]
 
+_RIM = 4
+
 
 @njit(cache=True, nogil=True)
 def sample_places(side: int) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
@@ -70,7 +72,7 @@ def gathered(texture: FloatArray, side: int, plane: FloatArray) -> None:
 
 @njit(cache=True, nogil=True, fastmath=True)
 def reduced(values: FloatArray, counted: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
-    """Views (n, 1024) averaged over what counts in each of side x side cells, and how much counts."""
+    """Averages (n, side²) of views (n, 1024) over what counts in each cell, and how much counts."""
     views = len(values)
     cell = SIDE // side
     small = np.zeros((views, side * side), np.float32)
@@ -143,3 +145,37 @@ def sharpen(
             gathered(total, side, plane)
             for q in range(side * side):
                 planes[k, q] += step[k, q] * plane[q]
+
+
+@njit(cache=True, nogil=True)
+def fill_unknown(planes: FloatArray, counted: FloatArray, side: int) -> None:
+    """Planes (r, side * side), in place, where no view's ``counted`` (n, side * side) is above 0.
+
+    Texels take the mean of the known ones around them, a rim of ``_RIM`` texels: little holes are
+    opaque, and at outlines the shader interpolates with what lies outside.
+    """
+    known = np.zeros((side, side), np.bool_)
+    for i in range(len(counted)):
+        for q in range(side * side):
+            if counted[i, q] > 0.0:
+                known[q // side, q % side] = True
+    for _ in range(_RIM):
+        before = known.copy()
+        for y in range(side):
+            for x in range(side):
+                if before[y, x]:
+                    continue
+                around = 0
+                for v in range(max(y - 1, 0), min(y + 2, side)):
+                    for u in range(max(x - 1, 0), min(x + 2, side)):
+                        around += before[v, u]
+                if around == 0:
+                    continue
+                known[y, x] = True
+                for k in range(len(planes)):
+                    total = np.float32(0.0)
+                    for v in range(max(y - 1, 0), min(y + 2, side)):
+                        for u in range(max(x - 1, 0), min(x + 2, side)):
+                            if before[v, u]:
+                                total += planes[k, v * side + u]
+                    planes[k, y * side + x] = total / np.float32(around)

@@ -20,8 +20,8 @@ _SWAY, _WAVELENGTH = 0.25, 70.0
 _CAMERA_GAINS = 0.04
 _DRIFT = 45.0
 """Metres of road in which the exposure goes up and down."""
-_FULL_WELL = 4000.0
-"""Photons that noise 1 % at white would belong to times 1e-4: see ``photograph``."""
+_READING = 0.1
+"""Variance of reading, of that of photons at white."""
 
 
 class SimulatedDrive(NamedTuple):
@@ -51,10 +51,10 @@ def plan_drive(
 ) -> SimulatedDrive:
     """A drive from x = 0 towards +x: a frame every ``spacing`` metres of x.
 
-    view_angle: horizontal, degrees. Cameras are, from 0 to 2, ``baseline`` metres to the left of the
-    car's middle, in it, and to its right. A camera's gain is a constant of a few percent times a slow
-    drift of a standard deviation of ``exposure_spread`` over the frames. Raises ValueError for
-    sizes that are not positive.
+    view_angle: horizontal, degrees. Cameras are, from 0 to 2, ``baseline`` metres to the left of
+    the car's middle, in it, and to its right, at ``camera_height`` metres. A camera's gain is a
+    constant of a few percent times a slow drift, whose standard deviation over a long drive is
+    ``exposure_spread``. Raises ValueError for sizes that are not positive.
     """
     if frames < 1 or not spacing > 0.0 or width < 1 or height < 1 or not 0 < view_angle < 180:
         raise ValueError(
@@ -109,11 +109,11 @@ def photograph(
 ) -> NDArray[np.uint8]:
     """What a sensor makes of radiance (h, w, 3): 8-bit sRGB of radiance * gain * exposure.
 
-    noise: standard deviation at white, in linear light; its variance has a part that is proportional
-    to the light (photons) and a constant one of a tenth of its size (reading). 0: none.
+    noise: standard deviation at white, in linear light, 0 for none. Its variance is proportional to
+    the light (photons) plus a tenth of white (reading).
     """
     light = np.asarray(radiance, np.float64) * (gain * exposure)
     if noise > 0.0:
-        deviation = noise * np.sqrt((np.clip(light, 0.0, 1.0) + 0.1) / 1.1)
+        deviation = noise * np.sqrt((np.clip(light, 0.0, 1.0) + _READING) / (1.0 + _READING))
         light = light + deviation * generator.standard_normal(light.shape)
     return to_8bit(light)

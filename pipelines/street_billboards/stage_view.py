@@ -20,7 +20,8 @@ The stage's own near plane is at a thousandth of the far one.
 from __future__ import annotations
 
 import functools
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from pipelines.stage import Camera, Shader, require_graphics, surface, texture
 from pipelines.street_billboards.atlases import MOST_TEXELS, Page, pages
 from pipelines.street_billboards.billboards import Billboards, turned_axes
 from pipelines.street_billboards.culling import visible
-from pipelines.street_billboards.decoding import decoded_views
+from pipelines.street_billboards.decoding import Decodable, decodable, decoded_views
 from pipelines.street_billboards.textures import SIDE, CompressedTextures
 from pipelines.street_billboards.view_directions import CIRCLE, DIRECTIONS, fan_position
 
@@ -50,7 +51,7 @@ def most_texels_of_driver() -> int:
     window = vtkRenderWindow()
     window.SetOffScreenRendering(True)
     window.Initialize()
-    most = int(vtkTextureObject.GetMaximumTextureSize(window))
+    most = int(vtkTextureObject.GetMaximumTextureSize(cast(Any, window)))
     window.Finalize()
     return most
 
@@ -82,8 +83,8 @@ def stage_camera(
 def _check_middle(name: str, found: float, count: int) -> None:
     if abs(found - (count - 1) / 2) > 1e-3:
         raise ValueError(
-            f"intrinsics: the principal point is in {name} {found}; expected {(count - 1) / 2}, the "
-            f"middle of {count}."
+            f"intrinsics: the principal point is in {name} {found}; expected "
+            f"{(count - 1) / 2}, the middle of {count}."
         )
 
 
@@ -93,22 +94,27 @@ def _check_middle(name: str, found: float, count: int) -> None:
 class Street:
     """Billboards with textures that the shader decodes.
 
-    most_texels: of a texture's side; less where the driver has less. ``actors`` are for
-    ``Stage.add``, one a page (``pages``); nothing shows before ``look``. Raises ValueError as
-    ``atlases.pages``.
+    textures: of the same b billboards, or as ``atlases.pages`` packed them. most_texels: of a
+    texture's side, where they are still to be packed; less where the driver has less. ``actors``
+    are for ``Stage.add``, one a page (``pages``); nothing shows before ``look``. Raises ValueError
+    as ``atlases.pages``, and for pages that the driver cannot hold or of other billboards.
     """
 
     def __init__(
         self,
         billboards: Billboards,
-        textures: CompressedTextures,
+        textures: CompressedTextures | Sequence[Page],
         *,
         most_texels: int = MOST_TEXELS,
     ) -> None:
+        most = most_texels_of_driver()
+        if isinstance(textures, CompressedTextures):
+            textures = pages(textures, min(most_texels, most))
+        self.pages = list(textures)
+        _check_pages(self.pages, len(billboards.centre), most)
         self._billboards = billboards
-        self._drawable = np.diff(textures.first) > 0
-        self.pages = pages(textures, min(most_texels, most_texels_of_driver()))
-        self.actors = [_page_actor(billboards, textures, page) for page in self.pages]
+        self._drawable = np.concatenate([np.empty(0, bool), *(p.has_views for p in self.pages)])
+        self.actors = [_page_actor(billboards, page) for page in self.pages]
 
     def look(
         self,
@@ -127,6 +133,19 @@ class Street:
             first, last = page.billboards[0], page.billboards[-1]
             _send_quads(actor, seen[(seen >= first) & (seen <= last)] - first)
         return len(seen)
+
+
+def _check_pages(pages: Sequence[Page], count: int, most: int) -> None:
+    found = sum(len(page.billboards) for page in pages)
+    if found != count:
+        raise ValueError(f"pages: found textures of {found} billboards; expected {count}.")
+    sheets = [sheet for p in pages for sheet in (p.detail.texels, p.tint.texels, p.views, p.masks)]
+    largest = max((max(sheet.shape[:2]) for sheet in sheets), default=0)
+    if largest > most:
+        raise ValueError(
+            f"pages: found a texture of {largest} texels; expected {most} at most, which is what "
+            "the graphics driver has."
+        )
 
 
 def _seen(
@@ -157,7 +176,7 @@ def _send_quads(actor: Any, quads: NDArray[np.int64]) -> None:
     mesh.Modified()
 
 
-def _page_actor(billboards: Billboards, textures: CompressedTextures, page: Page) -> Any:
+def _page_actor(billboards: Billboards, page: Page) -> Any:
     rows = page.billboards
     geometry = np.zeros((len(rows), 3, 4), np.float32)
     geometry[:, 0, :3] = billboards.centre[rows]
@@ -165,7 +184,6 @@ def _page_actor(billboards: Billboards, textures: CompressedTextures, page: Page
     geometry[:, 2, :3] = billboards.half_t[rows]
     geometry[:, 0, 3] = billboards.fan[rows]
     geometry[:, 1, 3] = billboards.turns[rows]
-    geometry[:, 2, 3] = np.diff(textures.first_mask)[rows] > 1
     headers = np.concatenate([geometry, page.records], axis=1)
     columns = max(int(np.sqrt(len(rows))), 1)
     header_rows = -(-len(rows) // columns)
@@ -184,7 +202,7 @@ def _page_actor(billboards: Billboards, textures: CompressedTextures, page: Page
         _bounding_points(billboards, rows),
         _QUAD.reshape(-1, 3),
         textures=images,
-        shader=_shader(page, columns, textures.colour),
+        shader=_shader(page, columns),
         lit=False,
     )
     _send_quads(actor, np.empty(0, np.int64))
@@ -210,10 +228,10 @@ def _fixed(image: NDArray[Any], *, interpolate: bool = False) -> Any:
 # ---- the shader --------------------------------------------------------------------------------
 
 
-def _shader(page: Page, header_columns: int, colour: str) -> Shader:
+def _shader(page: Page, header_columns: int) -> Shader:
     detail, tint = page.detail.most_tiles, page.tint.most_tiles
-    declared = "vec2 placeOut; flat {0} vec4 baseOut; flat {0} vec4 tilesOut; flat {0} vec4 runsOut;"
-    declared = "{0} " + declared
+    declared = "{0} vec2 placeOut;"
+    declared += " flat {0} vec4 baseOut; flat {0} vec4 tilesOut; flat {0} vec4 runsOut;"
     if detail:
         declared += f" flat {{0}} vec4 detailOut[{detail}];"
     if tint:
@@ -227,11 +245,11 @@ def _shader(page: Page, header_columns: int, colour: str) -> Shader:
             + samplers
             + declared.format("out")
             + _VERTEX_FUNCTIONS,
-            "PositionVC::Impl": _vertex(page, header_columns, colour),
+            "PositionVC::Impl": _vertex(page, header_columns),
         },
         fragment={
             "TCoord::Dec": "//VTK::TCoord::Dec\n" + declared.format("in") + _FRAGMENT_FUNCTIONS,
-            "Color::Impl": "//VTK::Color::Impl\n" + _fragment(page, colour),
+            "Color::Impl": "//VTK::Color::Impl\n" + _fragment(page),
         },
     )
 
@@ -251,10 +269,10 @@ int lowest(uint bits) { return int(ones((bits & (~bits + 1u)) - 1u)); }
 """
 
 
-def _vertex(page: Page, header_columns: int, colour: str) -> str:
+def _vertex(page: Page, header_columns: int) -> str:
     views, masks = page.views.shape[1], page.masks.shape[1] // SIDE
     outside = (CIRCLE - DIRECTIONS + 1) / 2
-    neutral = "vec3(0.0, 128.0, 128.0)" if colour == "ycocg" else "vec3(0.0)"
+    neutral = "vec3(0.0, 128.0, 128.0)" if page.flags[0, 1] else "vec3(0.0)"
     parts = [
         f"""
   int billboard = gl_VertexID / 4, corner = gl_VertexID - 4 * billboard;
@@ -276,7 +294,7 @@ def _vertex(page: Page, header_columns: int, colour: str) -> str:
   int lower = max(below - 1, 0), upper = min(below, count - 1);
   float from = float(highest(up)), to = float(lowest(beyond));
   float part = lower == upper ? 0.0 : (position - from) / (to - from);
-  int detailTiles = int(runs.z) & 63, tintTiles = int(runs.z) >> 6;
+  int detailTiles = int(runs.z) & 63, tintTiles = (int(runs.z) >> 6) & 63;
   int taken = 1 + detailTiles + tintTiles;
   int lowerTexel = int(stored.x) + lower * taken, upperTexel = int(stored.x) + upper * taken;
   vec3 base = 255.0 * mix(
@@ -284,7 +302,7 @@ def _vertex(page: Page, header_columns: int, colour: str) -> str:
     texelFetch(views, ivec2(upperTexel % {views}, upperTexel / {views}), 0).rgb, part)
     - {neutral};
   int mask = int(stored.y);
-  if (halfT.w > 0.5) mask += part < 0.5 ? lower : upper;
+  if ((int(runs.z) & 4096) != 0) mask += part < 0.5 ? lower : upper;
 """
     ]
     for name, atlas in (("detail", page.detail), ("tint", page.tint)):
@@ -350,7 +368,7 @@ uint rowOfMask(int column, int row) {
 )
 
 
-def _fragment(page: Page, colour: str) -> str:
+def _fragment(page: Page) -> str:
     parts = [
         f"""
   vec2 texel = clamp(placeOut * {SIDE}.0 - 0.5, 0.0, {SIDE - 1}.0);
@@ -374,7 +392,7 @@ def _fragment(page: Page, colour: str) -> str:
         added = (
             "codes.x += dot(planes, vec4(1.0));"
             if name == "detail"
-            else """vec4 second = step(vec4(runsOut.z - 0.5), vec4(4 * k) + vec4(0.0, 1.0, 2.0, 3.0));
+            else """vec4 second = step(vec4(runsOut.z - 0.5), vec4(4 * k) + vec4(0, 1, 2, 3));
     codes.z += dot(planes, second);
     codes.y += dot(planes, 1.0 - second);"""
         )
@@ -389,7 +407,7 @@ def _fragment(page: Page, colour: str) -> str:
     if ({name}Place.x >= {columns}.0) {name}Place += vec2(-{columns}.0, 1.0);
   }}
 """)
-    if colour == "ycocg":
+    if page.flags[0, 1]:
         parts.append("""
   codes = codes.x + vec3(codes.y - codes.z, codes.z, -codes.y - codes.z);
 """)
@@ -421,7 +439,7 @@ class CpuStreet:
         *,
         most_texels: int = MOST_TEXELS,
     ) -> None:
-        self._billboards, self._textures = billboards, textures
+        self._billboards, self._textures = billboards, decodable(textures)
         self._drawable = np.diff(textures.first) > 0
         across = min(most_texels, most_texels_of_driver()) // SIDE
         count = len(billboards.centre)
@@ -465,7 +483,7 @@ class _Tiles:
     def show(
         self,
         billboards: Billboards,
-        textures: CompressedTextures,
+        textures: Decodable,
         chosen: NDArray[np.int64],
         eye: NDArray[np.float64],
     ) -> None:
@@ -507,7 +525,7 @@ def _corners(
 
 
 def _tile_shader(columns: int) -> Shader:
-    # The texture's height changes; VTK's changed uniforms would do as well, textureSize is free.
+    # The texture's height is another in each frame.
     return Shader(
         vertex={
             "TCoord::Dec": "out vec2 placeOut; flat out vec2 tileOut;",

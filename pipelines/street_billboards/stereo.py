@@ -159,20 +159,8 @@ def _pair_depth(
         focal = float(intrinsics[0, 0, 0])
         shown = photographs
     else:
-        back = np.linalg.inv(to_left)
-        turn_left, turn_right, new_left, new_right, *_ = cv2.stereoRectify(
-            intrinsics[0].astype(float),
-            np.zeros(5),
-            intrinsics[1].astype(float),
-            np.zeros(5),
-            (width, height),
-            back[:3, :3],
-            back[:3, 3],
-            flags=cv2.CALIB_ZERO_DISPARITY,
-            alpha=-1,
-        )
-        focal = float(new_left[0, 0])
-        turns, planes = (turn_left, turn_right), (new_left[:, :3], new_right[:, :3])
+        turns, plane = _rectification(intrinsics, poses)
+        focal = float(plane[0, 0])
         shown = np.stack(
             [
                 cv2.remap(
@@ -181,11 +169,12 @@ def _pair_depth(
                         intrinsics[i].astype(float),
                         np.zeros(5),
                         turns[i],
-                        planes[i],
+                        plane,
                         (width, height),
                         cv2.CV_32FC1,
                     ),
                     cv2.INTER_CUBIC,
+                    borderMode=cv2.BORDER_REPLICATE,
                 )
                 for i in range(2)
             ]
@@ -197,13 +186,26 @@ def _pair_depth(
         scale = np.ones((1, 1), np.float32)
         if not straight:
             disparity, confidence, scale = _unrectified(
-                found, intrinsics[i].astype(float), turns[i], planes[i]
+                found, intrinsics[i].astype(float), turns[i], plane
             )
         with np.errstate(divide="ignore"):
             axial = focal * baseline / disparity
         spread = axial**2 / (focal * baseline) * (0.15 + 0.35 * (1 - confidence))
         answer.append(((axial * scale).astype(np.float32), (spread * scale).astype(np.float32)))
     return answer
+
+
+def _rectification(
+    intrinsics: NDArray[np.floating], poses: NDArray[np.floating]
+) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Rotations of two cameras' axes to common ones whose x is the baseline, and a common K."""
+    along = poses[1, :3, 3] - poses[0, :3, 3]
+    across = along / np.linalg.norm(along)
+    forward = poses[0, :3, 2] + poses[1, :3, 2]
+    down = np.cross(forward, across)
+    down /= np.linalg.norm(down)
+    axes = np.stack([across, down, np.cross(across, down)])
+    return [axes @ pose[:3, :3] for pose in poses], intrinsics.mean(axis=0, dtype=np.float64)
 
 
 def _unrectified(

@@ -18,8 +18,9 @@ def masks_of(
     more looked through it. Texels that none saw are opaque where most of their eight neighbours
     are: they are the holes between a point cloud's points.
 
-    One that turns (turns, (b,)) shows each view another outline, so it has one a view: unseen texels
-    are as in the view nearest in direction that knows, and texels without a neighbour are dropped.
+    One that turns (turns, (b,)) shows each view another outline, so it has one a view: unseen
+    texels are as in the view nearest in direction that knows, and texels without a neighbour are
+    dropped.
     """
     first = views.first.astype(np.int64)
     counts = np.where(turns, np.diff(first), 1)

@@ -28,9 +28,11 @@ NEAREST = 1.0
 _SIGMAS = 3.0
 """Standard deviations of a depth that still agree with the surface."""
 _TOLERANCE = 0.15
-"""Least of that, in voxel sides."""
-_LEAST_SEEN = 0.12
-"""Share of a rectangle's texels that a view must show."""
+"""Distance from a billboard's plane that still agrees with it, in voxel sides."""
+_LEAST_TEXELS = 12
+"""That a view must show."""
+_LEAST_SHARE = 0.4
+"""Of the texels that the billboard's best view shows; what fewer tell of the rest is a guess."""
 _MOST_SAMPLES = 3
 """Of a texel's side, where the photograph is finer than the texture."""
 
@@ -92,9 +94,10 @@ def view_textures(
         states,
         sharpness,
     )
-    # A still billboard's rectangle may leave its voxel: what can be seen at all counts.
-    seen = (states == SEEN).sum(axis=(1, 2)) / (SIDE * SIDE)
-    kept = seen >= np.where(billboards.turns[owner], _LEAST_SEEN / 8, _LEAST_SEEN)
+    seen = (states == SEEN).sum(axis=(1, 2))
+    most = np.zeros(len(first) - 1, np.int64)
+    np.maximum.at(most, owner, seen)
+    kept = (seen >= _LEAST_TEXELS) & (seen >= _LEAST_SHARE * most[owner])
     ends = np.zeros(len(first), np.int64)
     ends[1:] = np.cumsum(np.bincount(owner[kept], minlength=len(first) - 1))
     return ViewTextures(ends, direction[kept], colours[kept], states[kept], sharpness[kept])
@@ -346,17 +349,35 @@ def _state(
     there = depth[y, x]
     if math.isnan(there):
         return UNSEEN if turning else SEEN
-    off = 0.0 if math.isinf(there) else deviation[y, x]
-    tolerance = max(_SIGMAS * off, _TOLERANCE * voxel_side)
-    if turning:
-        # Points of the voxel lie inside it: the depth's own deviation is all there is to allow.
-        tolerance = _SIGMAS * off
+    # Points of the voxel lie inside it: for one that turns, the depth's own deviation is all there
+    # is to allow. From a plane they may be off by a distance, which a grazing look makes long.
+    tolerance = 0.0 if math.isinf(there) else _SIGMAS * deviation[y, x]
+    if not turning:
+        off = _TOLERANCE * voxel_side / max(_steepness(row, column, point, to_world, z), 1e-3)
+        tolerance = max(tolerance, min(off, voxel_side))
     # Colours of a nearer thing bleed over its outline.
     for beside in range(9):
         px, py = x + beside % 3 - 1, y + beside // 3 - 1
         if 0 <= px < width and 0 <= py < height and depth[py, px] < near - tolerance:
             return UNSEEN
     return EMPTY if there > far + tolerance else SEEN
+
+
+@njit(cache=True, nogil=True)
+def _steepness(
+    row: FloatArray, column: FloatArray, point: FloatArray, to_world: FloatArray, z: float
+) -> float:
+    """Distance from the plane of what is a metre of depth from it, m."""
+    nx = row[1] * column[2] - row[2] * column[1]
+    ny = row[2] * column[0] - row[0] * column[2]
+    nz = row[0] * column[1] - row[1] * column[0]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    along = (
+        nx * (point[0] - to_world[0, 3])
+        + ny * (point[1] - to_world[1, 3])
+        + nz * (point[2] - to_world[2, 3])
+    )
+    return abs(along) / (length * z)
 
 
 @njit(cache=True, nogil=True)

@@ -52,12 +52,21 @@ DEPTH_MAPS = Schema(
     "Depth of each photograph that is not held out, by semi-global matching of neighbours.",
     {
         "depth": Variable(
-            ("taken", "camera", "y", "x"), "float32", "m", "Along the axis; NaN where unknown"
+            ("taken", "camera", "y", "x"),
+            "float32",
+            "m",
+            "Along the axis; NaN where unknown, inf in the sky",
         ),
         "deviation": Variable(
             ("taken", "camera", "y", "x"), "float32", "m", "Standard deviation to be expected"
         ),
         "frame": Variable(("taken",), "int64", "1", "Which frame of the drive"),
+        "sky": Variable(
+            ("row", "column", "channel"),
+            "float32",
+            "1",
+            "Radiance of what is farther than depths reach, equirectangular, z up",
+        ),
     },
 )
 
@@ -116,12 +125,6 @@ VIEW_TEXTURES = Schema(
             ("view", "v", "u"), "uint8", "1", "0 nobody looked there, 1 seen, 2 looked through"
         ),
         "sharpness": Variable(("view",), "float32", "1", "Pixels of the photograph to a texel"),
-        "sky": Variable(
-            ("row", "column", "channel"),
-            "float32",
-            "1",
-            "Radiance of what no surface hides, equirectangular, z up",
-        ),
     },
 )
 

@@ -17,6 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines import stage as module
+from pipelines.raycasting import build_scene, first_hits
 from pipelines.stage import (
     Camera,
     Light,
@@ -792,3 +793,84 @@ def test_a_failed_look_for_a_driver_is_repeated(monkeypatch: pytest.MonkeyPatch)
 def test_the_renderer_has_a_name() -> None:
     with Stage(8, 8) as stage:
         assert stage.renderer_name not in ("", "unknown")
+
+
+# ---- depth -----------------------------------------------------------------------------------
+
+
+def test_depth_of_a_plane_is_its_closed_form() -> None:
+    """A plane through the picture: 1 / depth is linear in the pixels."""
+    camera = Camera((0.0, -4.0, 3.0), (0.0, 0.0, 0.0), view_angle=50)
+    with Stage(40, 30) as stage:
+        stage.add(unlit_square(size=1.5))
+        stage.look(camera)
+        stage.draw()
+        depth = stage.depth()
+    assert depth.shape == (30, 40)
+    assert depth.dtype == np.float32
+    ahead = unit(np.subtract(camera.target, camera.position))
+    right = unit(np.cross(ahead, (0, 0, 1)))
+    up = np.cross(right, ahead)
+    slope = math.tan(math.radians(25))
+    across = (2 * (np.arange(40) + 0.5) / 40 - 1) * slope * 40 / 30
+    upwards = (1 - 2 * (np.arange(30) + 0.5) / 30) * slope
+    rays = ahead + across[None, :, None] * right + upwards[:, None, None] * up
+    expected = -camera.position[2] / rays[..., 2]
+    places = np.asarray(camera.position) + expected[..., None] * rays
+    inside = (np.abs(places[..., :2]) < 1.5).all(axis=-1)
+    assert 100 < inside.sum() < 1100
+    np.testing.assert_array_equal(np.isfinite(depth), inside)
+    np.testing.assert_allclose(depth[inside], expected[inside], rtol=1e-5)
+
+
+@pytest.mark.parametrize("environment", [False, True])
+def test_depth_is_that_of_rays(environment: bool) -> None:
+    rng = np.random.default_rng(3)
+    vertices = rng.uniform(-1, 1, (30, 3)).astype(np.float32)
+    triangles = np.arange(30).reshape(-1, 3)
+    camera = orbit((0, 0, 0), 4, 30, 20, view_angle=35)
+    sky = np.ones((4, 8, 3), np.float32)
+    with Stage(60, 60, background=sky if environment else (0.0, 0.0, 0.0)) as stage:
+        stage.add(surface(vertices, triangles, lit=False))
+        stage.look(camera)
+        stage.draw()
+        depth = stage.depth()
+    ahead = unit(np.subtract(camera.target, camera.position))
+    right = unit(np.cross(ahead, (0, 0, 1)))
+    place = (2 * (np.arange(60) + 0.5) / 60 - 1) * math.tan(math.radians(17.5))
+    rays = ahead + place[None, :, None] * right - place[:, None, None] * np.cross(right, ahead)
+    scene = build_scene(vertices, triangles)
+    expected = first_hits(scene, camera.position, rays.reshape(-1, 3)).distance.reshape(60, 60)
+    same = np.isfinite(expected) == np.isfinite(depth)
+    assert same.mean() > 0.99
+    both = np.isfinite(expected) & np.isfinite(depth)
+    assert both.mean() > 0.2
+    close = np.abs(depth[both] - expected[both]) < 1e-4 * expected[both]
+    assert close.mean() > 0.98  # the others are at edges
+
+
+def test_depth_with_supersampling_is_a_sample_and_no_average() -> None:
+    camera = Camera((0.0, -4.0, 3.0), (0.0, 0.0, 0.0), view_angle=50)
+    depths = {}
+    for size, n in ((10, 1), (10, 3), (30, 1)):
+        with Stage(size, size, supersampling=n) as stage:
+            stage.add(unlit_square(size=1.5))
+            stage.look(camera)
+            stage.draw()
+            depths[size, n] = stage.depth()
+    np.testing.assert_array_equal(depths[10, 3], depths[30, 1][1::3, 1::3])
+    np.testing.assert_allclose(depths[10, 3], depths[10, 1], rtol=1e-5)
+
+
+def test_depth_of_an_orthographic_picture_and_of_nothing() -> None:
+    with Stage(8, 8) as stage:
+        square = unlit_square(size=0.5, height=1.25)
+        stage.add(square)
+        stage.look(FROM_ABOVE)  # 5 above the target
+        stage.draw()
+        expected = np.full((8, 8), np.inf)
+        expected[2:6, 2:6] = 3.75
+        np.testing.assert_allclose(stage.depth(), expected, rtol=1e-5)
+        stage.remove(square)
+        stage.draw()
+        assert np.isinf(stage.depth()).all()
