@@ -14,11 +14,12 @@ from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
 from assets_defs.rematerialisation import daily_schedule, launch_job
 from assets_defs.ssdf_lighting import SSDF
+from assets_defs.street_billboards import STREET
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from storage.io_manager import ZarrIOManager
 
-SYSTEMS: dict[str, System] = {system.name: system for system in (FUR, BTF, SCRATCHES, SSDF)}
+SYSTEMS: dict[str, System] = {system.name: system for system in (FUR, BTF, SCRATCHES, SSDF, STREET)}
 
 
 def build_definitions(

@@ -19,7 +19,7 @@ from assets_defs.street_billboards.datasets import (
     views_of,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata
+from assets_defs.system import Metadata, Source
 from storage.schemas import street_billboards as schemas
 
 if TYPE_CHECKING:
@@ -32,6 +32,32 @@ if TYPE_CHECKING:
 
 RAW_BYTES = 98_304
 """Of a billboard: 32 views of 32 x 32 pixels of 3 bytes."""
+_LEAST_BYTES = 136
+"""A billboard has a mask, a mean colour and a direction at least."""
+_LEAST_WIDTH = 5.0
+"""Metres of a road."""
+
+
+def check_bytes(source: Source, settings: Mapping[str, Settings]) -> None:
+    """Whether the atlases' budget could hold the street's textures. Raises ValueError.
+
+    A road is five metres wide at least; how many billboards there are is not known before.
+    """
+    from assets_defs.street_billboards.drive import metres_of
+
+    voxel = settings["billboards"].model_dump()["voxel"]
+    eigen, budget = settings["eigen_textures"].model_dump(), settings["texture_atlases"]
+    each = _LEAST_BYTES
+    if eigen["coding"] == "paper" and eigen["contribution"] is None:
+        each = eigen["rank"] * (3 * 32 * 32 + 3 * 32) + 3 * 32
+    metres = metres_of(source, settings["drive_frames"])
+    least = int(metres * _LEAST_WIDTH / voxel**2) * each
+    allowed = int(budget.model_dump()["byte_budget"])
+    if least > allowed:
+        raise ValueError(
+            f"{source.name}: the textures of {metres:.0f} m of road need {least} bytes at least; "
+            f"expected no more than byte_budget, {allowed}."
+        )
 
 
 # ---- eigen_textures --------------------------------------------------------------------------

@@ -26,8 +26,8 @@ def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
 
 
 def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """The bytes of the paper's textures, before any work."""
-    if "drive" in sources and "eigen_textures" in settings:
+    """The bytes of the textures, before any work."""
+    if "drive" in sources and "texture_atlases" in settings:
         from assets_defs.street_billboards.compression import check_bytes
 
         check_bytes(sources["drive"], settings)

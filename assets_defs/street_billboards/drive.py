@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 OFFSETS = (1.0, 2.0, 3.0)
 """Metres beside the path, to the left."""
+EXPOSURE = 0.95
+"""From the simulated city's radiance to pictures."""
 HELD_OUT_EVERY, HELD_OUT_FIRST = 10, 5
 LEAST_AGREEMENT = 0.3
 """Share of points that neighbouring frames confirm; wrong calibrations leave a tenth."""
@@ -75,6 +77,17 @@ def check_agreement(drive: Drive, name: str) -> None:
             f"{name}: of the points of time {drive.times[middle]:g} the frames beside it confirm "
             f"{found:.0%}; expected {LEAST_AGREEMENT:.0%} at least: intrinsics or poses are wrong."
         )
+
+
+def metres_of(source: Source, settings: Settings) -> float:
+    """Length of a drive."""
+    import numpy as np
+
+    given = settings.model_dump()
+    if source.path is None:
+        return float(given["frames"] * given["spacing"])
+    places = read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
 def _drive_pictures(dataset: xr.Dataset) -> Pictures:
@@ -231,7 +244,6 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
     random = np.random.default_rng(settings.seed)
     streets = city(settings.frames * settings.spacing, settings.seed)
     progress(0.1)
-    exposure = 1.0
     with CityStage(streets, street_photographs(), width, height) as stage:
         for frame in range(frames):
             for camera in range(cameras):
@@ -239,13 +251,13 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
                 pose, lens = plan.poses[frame, camera], plan.intrinsics[camera]
                 shot = stage.shoot(lens, pose, labels=labels)
                 photographs[frame, camera] = photograph(
-                    shot.radiance, plan.gains[frame, camera], exposure, settings.noise, random
+                    shot.radiance, plan.gains[frame, camera], EXPOSURE, settings.noise, random
                 )
                 if labels:
                     truth_depth.append(shot.depth)
                     truth_pole.append(shot.pole)
-                    moved = [lateral(pose, offset) for offset in OFFSETS]
-                    beside.append([to_8bit(stage.shoot(lens, one).radiance) for one in moved])
+                    moved = [stage.shoot(lens, lateral(pose, offset)) for offset in OFFSETS]
+                    beside.append([to_8bit(EXPOSURE * one.radiance) for one in moved])
             progress(0.1 + 0.9 * (frame + 1) / frames)
     dataset = xr.Dataset(
         {

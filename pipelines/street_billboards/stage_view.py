@@ -7,14 +7,18 @@ planes by the weights, converts colours, and hands on linear light. Only the tri
 in view are sent, nearest first.
 
 ``CpuStreet`` is the paper's rival: it decodes each visible billboard before the frame and sends
-RGBA8 tiles. The two agree because blending of texels and of planes can change places; but that
-decoded colours are rounded to codes and clamped to 0 to 255 before they are interpolated.
+RGBA8 tiles. The two agree because interpolating texels and adding planes can change places; but
+decoded colours are rounded and clamped to 0 to 255 before they are interpolated, and planes of a
+lower resolution are first sampled at the middles of 32 x 32 texels: between these the rival cuts
+off what such a plane has of peaks (noise of 40 codes differs by up to 5, smooth planes do not).
 
 Textures are interpolated between the middles of texels and clamped at a tile's rim. The mask is a
 bit a texel; between four middles the outline is where their interpolated bits are 0.5. A turning
 billboard between two views has the nearer one's mask, as a blend of bits says that is >= 0.5.
 
-The stage's own near plane is at a thousandth of the far one.
+The stage's own near plane is at a thousandth of the far one. The shader passes d + t + 4 vectors,
+d and t the tiles that planes of a billboard reach into (three channels of 31 planes: 29): OpenGL
+promises 16, drivers have 31 or more.
 """
 
 from __future__ import annotations
@@ -428,8 +432,8 @@ def _vec2(x: float, y: float) -> str:
 class CpuStreet:
     """The same billboards; each visible one is decoded by ``look`` and sent as a tile of RGBA8.
 
-    ``actors`` are for ``Stage.add``, one for each texture of tiles that all billboards would fill.
-    Raises ValueError for textures that would not fit.
+    ``actors`` are for ``Stage.add``, one for each texture of ``most_texels`` (or less, where the
+    driver has less) that the tiles of all billboards would fill.
     """
 
     def __init__(

@@ -8,11 +8,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.depth_refinement import Partner, rectified_partner, refined
+
 Photograph = NDArray[np.uint8]
 Map = NDArray[np.float32]
 
 _STEP = 16  # OpenCV's disparities are sixteenths of a pixel, their number a multiple of 16
 _AGREES = 1.0  # pixels between both sides' disparities of one point
+_BLOCK = 3
+_SPECKLE = 60  # pixels of the smallest patch that stays
+_FINE = 0.08  # pixels, the standard deviation where there is texture
 
 
 class DisparityMap(NamedTuple):
@@ -34,13 +39,29 @@ class DepthMaps(NamedTuple):
 
 
 def match(
-    left: Photograph, right: Photograph, most: int, *, block: int = 3, speckle: int = 60
+    left: Photograph, right: Photograph, most: int, *, refine: bool = True
 ) -> tuple[DisparityMap, DisparityMap]:
-    """Disparities of the left and of the right photograph of a rectified pair."""
+    """Disparities of the left and of the right photograph of a rectified pair.
+
+    left, right: (h, w, 3) sRGB, whose exposures may differ; most: the largest disparity looked for,
+    pixels. What only one of the two sees has none; ``depth_refinement.filled`` makes one up.
+    refine: at edges and below a pixel, with the photographs.
+    """
     greys = _greys(left, right)
-    ours = _matched(*greys, most, block, speckle)
-    theirs = _matched(greys[1][:, ::-1], greys[0][:, ::-1], most, block, speckle)[:, ::-1]
-    return _checked(ours, theirs, -1), _checked(theirs, ours, 1)
+    found = _both_sides(*greys, most)
+    if not refine:
+        return found
+    answer = []
+    for one, photograph, i, sign in ((found[0], left, 0, -1), (found[1], right, 1, 1)):
+        partner = rectified_partner(greys[1 - i].astype(np.float32), sign)
+        disparity, _ = refined(
+            one.disparity,
+            np.ascontiguousarray(photograph),
+            greys[i].astype(np.float32),
+            [partner],
+        )
+        answer.append(DisparityMap(disparity, one.confidence))
+    return answer[0], answer[1]
 
 
 def disparity_defaults(left: Photograph, right: Photograph, most: int) -> Map:
@@ -67,20 +88,62 @@ def depth_maps(
     farthest: float = 40.0,
 ) -> DepthMaps:
     """Depth of each camera of one frame."""
-    count, height, width = photographs.shape[:3]
-    depth = np.full((count, height, width), np.nan, np.float32)
-    deviation = np.full((count, height, width), np.nan, np.float32)
+    count = len(photographs)
+    intrinsics, poses = np.asarray(intrinsics, np.float64), np.asarray(poses, np.float64)
+    found = [_Found(*(np.full(photographs.shape[1:3], np.nan, np.float32) for _ in range(2)))] * (
+        count
+    )
     for i in range(count - 1):
         pair = slice(i, i + 2)
-        found = _pair_depth(photographs[pair], intrinsics[pair], poses[pair], nearest)
-        for camera, one in zip((i, i + 1), found, strict=True):
-            depth[camera], deviation[camera] = _merged(
-                depth[camera], deviation[camera], one[0], one[1]
-            )
+        seen = _pair_inverse(photographs[pair], intrinsics[pair], poses[pair], nearest)
+        found[i], found[i + 1] = _merged(found[i], seen[0]), _merged(found[i + 1], seen[1])
+    # A unit of inverse depth in which a step of 1 is a pixel between neighbours.
+    baseline = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).mean())
+    unit = float(intrinsics[:, 0, 0].mean()) * baseline
+    greys = [cv2.cvtColor(np.ascontiguousarray(i), cv2.COLOR_RGB2GRAY) for i in photographs]
+    depth, deviation = np.empty((2, *photographs.shape[:3]), np.float32)
+    for i in range(count):
+        partners = [
+            _partner(_alike(greys[i], greys[k]), intrinsics, poses, i, k, unit)
+            for k in range(count)
+            if k != i
+        ]
+        disparity, told = refined(
+            found[i].inverse * unit,
+            np.ascontiguousarray(photographs[i]),
+            greys[i].astype(np.float32),
+            partners,
+        )
+        with np.errstate(divide="ignore"):
+            depth[i] = unit / disparity
+        spread = np.minimum(found[i].spread * unit, 0.5) * (1 - told) + _FINE * told
+        deviation[i] = depth[i] ** 2 / unit * spread
     unknown = ~((depth >= nearest) & (depth <= farthest))
     depth[unknown] = np.nan
     deviation[unknown] = np.nan
     return DepthMaps(depth, deviation)
+
+
+class _Found(NamedTuple):
+    """One camera's inverse depths (h, w), 1 / m, and standard deviations; nan where unknown."""
+
+    inverse: Map
+    spread: Map
+
+
+def _partner(
+    grey: Photograph,
+    intrinsics: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    camera: int,
+    other: int,
+    unit: float,
+) -> Partner:
+    """Another camera of the frame, for disparities of ``unit`` over depth."""
+    way = np.linalg.inv(poses[other]) @ poses[camera]
+    turn = intrinsics[other] @ way[:3, :3] @ np.linalg.inv(intrinsics[camera])
+    shift = intrinsics[other] @ way[:3, 3] / unit
+    return Partner(grey.astype(np.float32), turn.astype(np.float32), shift.astype(np.float32))
 
 
 def _rounded(most: int) -> int:
@@ -92,32 +155,61 @@ def _greys(left: Photograph, right: Photograph) -> tuple[Photograph, Photograph]
     ours, theirs = (
         cv2.cvtColor(np.ascontiguousarray(i), cv2.COLOR_RGB2GRAY) for i in (left, right)
     )
-    gain = np.median(
-        np.percentile(ours, range(20, 81, 5))
-        / np.maximum(np.percentile(theirs, range(20, 81, 5)), 1)
-    )
-    return ours, cv2.convertScaleAbs(theirs, alpha=float(gain))
+    return ours, _alike(ours, theirs)
 
 
-def _matched(left: Photograph, right: Photograph, most: int, block: int, speckle: int) -> Map:
+def _alike(ours: Photograph, theirs: Photograph) -> Photograph:
+    """Their greys (h, w) at our exposure: in 8-bit sRGB, nearly a power law, nearly a factor."""
+    shares = range(20, 81, 5)
+    gains = np.percentile(ours, shares) / np.maximum(np.percentile(theirs, shares), 1)
+    return np.asarray(cv2.convertScaleAbs(theirs, alpha=float(np.median(gains))))
+
+
+def _both_sides(
+    left: Photograph, right: Photograph, most: int
+) -> tuple[DisparityMap, DisparityMap]:
+    ours = _matched(left, right, most)
+    theirs = _matched(right[:, ::-1], left[:, ::-1], most)[:, ::-1]
+    return _checked(ours, theirs, -1), _checked(theirs, ours, 1)
+
+
+def _most_there(left: Photograph, right: Photograph, most: int) -> int:
+    """The largest disparity that half the size shows, with room to spare: it may be far less."""
+    small = [
+        cv2.resize(i, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for i in (left, right)
+    ]
+    ours, _ = (one.disparity for one in _both_sides(small[0], small[1], most // 2 + 1))
+    known = ours[np.isfinite(ours)]
+    if len(known) == 0:
+        return most
+    return min(most, int(2.1 * np.percentile(known, 99.9)) + 3)
+
+
+def _matched(left: Photograph, right: Photograph, most: int, *, doubled: bool = False) -> Map:
+    """Disparities of the left photograph's greys, unchecked."""
     number = _rounded(most)
     # OpenCV leaves the first `number` columns empty; padded, it finds what is there.
-    padded = [cv2.copyMakeBorder(i, 0, 0, number, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
+    wide = [cv2.copyMakeBorder(i, 0, 0, number, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
+    times = 2 if doubled else 1
+    if doubled:
+        wide = [cv2.resize(i, None, fx=2, fy=1, interpolation=cv2.INTER_CUBIC) for i in wide]
     matcher = cv2.StereoSGBM.create(
         0,
-        number,
-        block,
-        8 * block * block,
-        32 * block * block,
+        number * times,
+        _BLOCK,
+        8 * _BLOCK**2,
+        32 * _BLOCK**2,
         -1,
         0,
         0,
-        speckle,
+        _SPECKLE * times,
         1,
         cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )
-    found = matcher.compute(*padded)[:, number:]
-    return np.where(found < 0, np.nan, found.astype(np.float32) / _STEP).astype(np.float32)
+    found = matcher.compute(*wide)[:, number * times :: times]
+    return np.where(found < 0, np.nan, found.astype(np.float32) / (_STEP * times)).astype(
+        np.float32
+    )
 
 
 def _checked(ours: Map, theirs: Map, sign: int) -> DisparityMap:
@@ -139,16 +231,16 @@ def _checked(ours: Map, theirs: Map, sign: int) -> DisparityMap:
     return DisparityMap(disparity, confidence)
 
 
-def _pair_depth(
+def _pair_inverse(
     photographs: Photograph,
     intrinsics: NDArray[np.floating],
     poses: NDArray[np.floating],
     nearest: float,
-) -> list[tuple[Map, Map]]:
+) -> list[_Found]:
     height, width = photographs.shape[1:3]
     to_left = np.linalg.inv(poses[0]) @ poses[1]
     if to_left[0, 3] < 0:  # the second stands left of the first
-        return _pair_depth(photographs[::-1], intrinsics[::-1], poses[::-1], nearest)[::-1]
+        return _pair_inverse(photographs[::-1], intrinsics[::-1], poses[::-1], nearest)[::-1]
     baseline = float(np.linalg.norm(to_left[:3, 3]))
     straight = (
         np.allclose(intrinsics[0], intrinsics[1], atol=1e-3)
@@ -179,7 +271,9 @@ def _pair_depth(
                 for i in range(2)
             ]
         )
-    maps = match(shown[0], shown[1], int(np.ceil(focal * baseline / nearest)))
+    greys = _greys(shown[0], shown[1])
+    most = _most_there(*greys, int(np.ceil(focal * baseline / nearest)))
+    maps = _both_sides(*greys, most)
     answer = []
     for i, found in enumerate(maps):
         disparity, confidence = found
@@ -188,10 +282,9 @@ def _pair_depth(
             disparity, confidence, scale = _unrectified(
                 found, intrinsics[i].astype(float), turns[i], plane
             )
-        with np.errstate(divide="ignore"):
-            axial = focal * baseline / disparity
-        spread = axial**2 / (focal * baseline) * (0.15 + 0.35 * (1 - confidence))
-        answer.append(((axial * scale).astype(np.float32), (spread * scale).astype(np.float32)))
+        inverse = disparity / (focal * baseline * scale)
+        spread = (0.15 + 0.35 * (1 - confidence)) / (focal * baseline * scale)
+        answer.append(_Found(inverse.astype(np.float32), spread.astype(np.float32)))
     return answer
 
 
@@ -236,16 +329,18 @@ def _unrectified(
     return disparity, confidence, (1 / turned[..., 2]).astype(np.float32)
 
 
-def _merged(first: Map, first_spread: Map, second: Map, second_spread: Map) -> tuple[Map, Map]:
+def _merged(first: _Found, second: _Found) -> _Found:
     """Two measurements of the same pixels: their mean where they agree, else the surer one."""
-    ours, theirs = np.isfinite(first), np.isfinite(second)
     with np.errstate(invalid="ignore"):
-        one, two = 1 / first_spread**2, 1 / second_spread**2
-        agree = np.abs(first - second) <= 3 * np.sqrt(first_spread**2 + second_spread**2)
-        take_second = ~agree & theirs & (~ours | (second_spread < first_spread))
-        mean = (first * one + second * two) / (one + two)
-    depth = np.where(agree, mean, np.where(take_second, second, first))
+        one, two = 1 / first.spread**2, 1 / second.spread**2
+        apart = np.abs(first.inverse - second.inverse)
+        agree = apart <= 3 * np.sqrt(first.spread**2 + second.spread**2)
+        mean = (first.inverse * one + second.inverse * two) / (one + two)
+        take_second = np.isfinite(second.inverse) & (
+            np.isnan(first.inverse) | (second.spread < first.spread)
+        )
+    inverse = np.where(agree, mean, np.where(take_second, second.inverse, first.inverse))
     spread = np.where(
-        agree, 1 / np.sqrt(one + two), np.where(take_second, second_spread, first_spread)
+        agree, 1 / np.sqrt(one + two), np.where(take_second, second.spread, first.spread)
     )
-    return depth.astype(np.float32), spread.astype(np.float32)
+    return _Found(inverse.astype(np.float32), spread.astype(np.float32))

@@ -1,17 +1,23 @@
-"""Figures of view textures, sampled apart from what made them."""
+"""Figures of textures, found apart from what made them."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.atlases import Page
 from pipelines.street_billboards.billboards import Billboards, turned_axes
 from pipelines.street_billboards.cameras import projected
+from pipelines.street_billboards.eigen_textures import alpha, decoded
 from pipelines.street_billboards.point_fusion import FrameViews
-from pipelines.street_billboards.textures import SEEN, SIDE, ViewTextures
+from pipelines.street_billboards.textures import SEEN, SIDE, CompressedTextures, ViewTextures
 
 _BILLBOARDS = 40
-"""How many are looked at."""
+"""How many are sampled anew."""
+_DECODED = 200
+"""How many are decoded anew."""
 
 
 def sampling_error(
@@ -52,3 +58,78 @@ def sampling_error(
             least = np.where(shown, np.minimum(least, apart), least)
         found.append(least)
     return float(np.median(np.concatenate(found))) if found else 255.0
+
+
+def decoded_rmse(views: ViewTextures, textures: CompressedTextures) -> float:
+    """RMSE in codes of some billboards' SEEN texels, decoded with plain NumPy."""
+    squares, count = 0.0, 0
+    for number in _some(np.flatnonzero(np.diff(views.first) > 0)):
+        rows = slice(views.first[number], views.first[number + 1])
+        found = decoded(textures, int(number))
+        stored = textures.direction[textures.first[number] : textures.first[number + 1]]
+        found = found[np.searchsorted(stored, views.direction[rows])]
+        seen = views.states[rows] == SEEN
+        apart = found[seen] - views.colours[rows][seen]
+        squares += float((apart**2).sum())
+        count += apart.size
+    return float(np.sqrt(squares / max(count, 1)))
+
+
+def unpacked_error(pages: Sequence[Page], textures: CompressedTextures) -> float:
+    """Largest difference in codes of some billboards read from pages as their layout says.
+
+    Masks that differ count as a difference of 255.
+    """
+    most = 0.0
+    for page in pages:
+        for place in _some(np.flatnonzero(np.diff(textures.first)[page.billboards] > 0)):
+            number = int(page.billboards[place])
+            found, masks = _read(page, int(place))
+            most = max(most, float(np.abs(found - decoded(textures, number)).max()))
+            if not np.array_equal(masks, alpha(textures, number)):
+                return 255.0
+    return most
+
+
+def _some(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    return numbers[:: max(len(numbers) // _DECODED, 1)]
+
+
+def _read(page: Page, place: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Views (n, 32, 32, 3) and masks (1 or n, 32, 32) of a page's billboard."""
+    (texel, mask, low, high), (detail, tint, code, second) = page.records[place].astype(np.int64)
+    count = int(low).bit_count() + int(high).bit_count()
+    code = int(code)
+    tiles = (code & 63, code >> 6 & 63)
+    table = page.views.reshape(-1, 4)[texel:].astype(np.float64)
+    table = table[: count * (1 + sum(tiles))].reshape(count, 1 + sum(tiles), 4)
+    channels = np.repeat(table[:, 0, :3, None], SIDE * SIDE, axis=2).reshape(count, 3, SIDE, SIDE)
+    taken = 1
+    for atlas, first, reached in ((page.detail, detail, tiles[0]), (page.tint, tint, tiles[1])):
+        columns = atlas.scales.shape[1]
+        for step in range(reached):
+            row, column = divmod(int(first) + step, columns)
+            side = atlas.side
+            tile = atlas.texels[row * side : (row + 1) * side, column * side : (column + 1) * side]
+            for lane in range(4):
+                plane = _full((tile[..., lane].astype(np.float64) - 128.0) / 127.0)
+                amount = (table[:, taken, lane] - 128.0) / 127.0 * atlas.scales[row, column, lane]
+                channel = 0 if atlas is page.detail else 1 + int(4 * step + lane >= second)
+                channels[:, channel] += amount[:, None, None] * plane
+            taken += 1
+    if code >> 13 & 1:
+        luma, orange, green = channels[:, 0], channels[:, 1] - 128.0, channels[:, 2] - 128.0
+        channels = np.stack([luma + orange - green, luma + green, luma - orange - green], axis=1)
+    flat = page.masks.reshape(page.masks.shape[0], -1, SIDE, 4).reshape(-1, SIDE, 4)
+    masks = flat[mask : mask + (count if code >> 12 & 1 else 1)]
+    bits = np.unpackbits(masks, axis=-1).astype(bool)
+    return np.clip(channels.transpose(0, 2, 3, 1), 0.0, 255.0), bits
+
+
+def _full(plane: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A plane of a lower resolution at a texture's texels."""
+    from scipy.ndimage import zoom
+
+    if len(plane) == SIDE:
+        return plane
+    return np.asarray(zoom(plane, SIDE / len(plane), order=1, mode="nearest", grid_mode=True))

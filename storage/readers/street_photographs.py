@@ -1,8 +1,9 @@
-"""The photographs that the built-in street is papered with: those in scikit-image's wheel."""
+"""Photographs in scikit-image's wheel: what the built-in street is papered with; a stereo pair."""
 
 from __future__ import annotations
 
 from importlib.resources import as_file, files
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,3 +40,27 @@ def street_photographs() -> dict[str, NDArray[np.uint8]]:
     with as_file(folder / "rocket.jpg") as file:
         photographs["rocket"] = decode_image(file).colours
     return photographs
+
+
+class StereoPair(NamedTuple):
+    """A rectified pair with what is known of it."""
+
+    left: NDArray[np.uint8]
+    """(y, x, 3), sRGB."""
+    right: NDArray[np.uint8]
+    disparity: NDArray[np.float32]
+    """(y, x), pixels, of the left picture; not finite where it was not measured."""
+    most: int
+    """No disparity is larger."""
+
+
+def motorcycle() -> StereoPair:
+    """A real calibrated pair (Scharstein and others 2014), as scikit-image brings it."""
+    folder = files("skimage") / "data"
+    pictures = []
+    for side in ("left", "right"):
+        with as_file(folder / f"motorcycle_{side}.png") as file:
+            pictures.append(decode_image(file).colours)
+    with as_file(folder / "motorcycle_disp.npz") as file, np.load(file) as stored:
+        disparity = stored["arr_0"].astype(np.float32)
+    return StereoPair(pictures[0], pictures[1], disparity, 80)

@@ -162,27 +162,29 @@ def inside(corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.bo
 # ---- many --------------------------------------------------------------------------------------
 
 
-def share_alike(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
-    """Share of pixels (…, 3) that differ by one code at most."""
-    return float((np.abs(one.astype(int) - other) <= 1).all(axis=-1).mean())
+def share_alike(one: NDArray[np.uint8], other: NDArray[np.uint8], codes: int = 1) -> float:
+    """Share of pixels (…, 3) that differ by so many codes at most."""
+    return float((np.abs(one.astype(int) - other) <= codes).all(axis=-1).mean())
 
 
-def a_street(count: int, seed: int, colour: str = "ycocg") -> tuple[Billboards, CompressedTextures]:
+def a_street(
+    count: int, seed: int, colour: str = "ycocg", tint_side: int = 16
+) -> tuple[Billboards, CompressedTextures]:
     placed = scattered(count, seed=seed)
-    side = 16 if colour == "ycocg" else 32
-    return placed, random_textures(placed.turns, seed=seed, colour=colour, tint_side=side)
+    return placed, random_textures(placed.turns, seed=seed, colour=colour, tint_side=tint_side)
 
 
-@pytest.mark.parametrize("colour", ["ycocg", "rgb"])
-def test_shader_and_processor_draw_the_same(colour: str) -> None:
-    placed, textures = a_street(1500, 8, colour)
+@pytest.mark.parametrize(("colour", "tint_side"), [("ycocg", 32), ("rgb", 32), ("ycocg", 16)])
+def test_shader_and_processor_draw_the_same(colour: str, tint_side: int) -> None:
+    placed, textures = a_street(1500, 8, colour, tint_side)
     camera = placed_camera((0.5, -1.0, 0.3), (9, 2, 0), SIZE, 100.0)
     mine, cover = picture(Street(placed, textures), *camera)
     rival, rival_cover = picture(CpuStreet(placed, textures), *camera)
     assert (cover != rival_cover).sum() <= 10
     both = cover & rival_cover
     assert both.mean() > 0.3
-    assert share_alike(mine[both], rival[both]) >= 0.999
+    # Small planes of noise are not the same between the middles of texels (see the module).
+    assert share_alike(mine[both], rival[both], 1 if tint_side == SIDE else 5) >= 0.999
 
 
 @pytest.mark.parametrize("street", [Street, CpuStreet])
@@ -215,8 +217,11 @@ def test_what_is_left_out_does_not_show(seed: int, monkeypatch: pytest.MonkeyPat
     rng = np.random.default_rng(seed)
     # Some stand around the camera, above and below it.
     eye = rng.uniform(-3, 3, 3)
-    placed.centre[:40] = eye + rng.normal(0, 0.7, (40, 3))
-    placed.centre[40] = eye + np.array([0.0, 0.0, 0.4])
+    towards = rng.standard_normal((40, 3))
+    towards[0] = [0.0, 0.0, 1.0]
+    # None reaches the near plane, which is another with another number of billboards.
+    towards *= rng.uniform(1.0, 1.8, (40, 1)) / np.linalg.norm(towards, axis=1, keepdims=True)
+    placed.centre[:40] = eye + towards
     camera = placed_camera(eye, rng.uniform(-9, 9, 3), SIZE, 80.0)
     sent = Street(placed, textures).look(*camera, *SIZE)
     assert 0 < sent < 450
