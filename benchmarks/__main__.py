@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-NAMES = ("btf", "fur", "scratches", "ssdf")
+NAMES = ("btf", "fur", "scratches", "ssdf", "street")
 SCALES = ("default", "paper")
 
 

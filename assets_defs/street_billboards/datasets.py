@@ -35,7 +35,7 @@ def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> FrameVie
     )
 
 
-def _merged(stacked: NDArray[np.generic]) -> NDArray[np.generic]:
+def _merged(stacked: NDArray[Any]) -> NDArray[Any]:
     """Frames and cameras as one axis."""
     return stacked.reshape(-1, *stacked.shape[2:])
 
@@ -78,16 +78,21 @@ def compressed_of(dataset: xr.Dataset) -> CompressedTextures:
     """An `eigen_textures` dataset's textures."""
     from pipelines.street_billboards.textures import CompressedTextures
 
+    def channels(name: str) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        first, second, third = (dataset[f"{name}_{number}"].values for number in range(3))
+        return first, second, third
+
     return CompressedTextures(
         colour=str(dataset.attrs["colour"]),
-        **{
-            name: dataset[name].values
-            for name in ("first", "direction", "means", "ranks", "first_mask", "masks")
-        },
-        **{
-            name: tuple(dataset[f"{name}_{number}"].values for number in range(3))
-            for name in ("planes", "scales", "weights")
-        },
+        first=dataset["first"].values,
+        direction=dataset["direction"].values,
+        means=dataset["means"].values,
+        ranks=dataset["ranks"].values,
+        planes=channels("planes"),
+        scales=channels("scales"),
+        weights=channels("weights"),
+        first_mask=dataset["first_mask"].values,
+        masks=dataset["masks"].values,
     )
 
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _SKY_FRAMES = 6
 """Frames that the sky is put together from."""
+_ASKED_FRAMES = 8
+"""Frames of which it is measured how much their neighbours confirm."""
 
 # ---- depth_maps ------------------------------------------------------------------------------
 
@@ -184,6 +186,7 @@ class PointSettings(Settings):
 
     farthest_point: float = Field(25.0, gt=0, description="Metres from the camera, at most")
     support: int = Field(2, ge=1, le=50, description="Depth maps that must confirm a point")
+    step: int = Field(2, ge=1, le=8, description="Pixels from one that becomes a point to the next")
     cell: float = Field(0.05, gt=0, le=1, description="Metres; points of one cell become one")
 
 
@@ -194,7 +197,7 @@ def _point_pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _agreement(checked: Checked) -> float:
-    return float(checked.dataset["agreement"].mean())
+    return float(checked.dataset["agreement"].mean(skipna=True))
 
 
 def _points_a_metre(checked: Checked) -> float:
@@ -282,7 +285,8 @@ def street_points(
     from pipelines.street_billboards.point_fusion import agreement, consistent_points, fused
 
     count, cameras = depth_maps.sizes["taken"], drive_frames.sizes["camera"]
-    confirmed = np.zeros(count)
+    confirmed = np.full(count, np.nan)
+    asked = set(np.linspace(0, count - 1, min(_ASKED_FRAMES, count)).astype(int))
 
     def parts() -> Iterator[Points]:
         for number in range(count):
@@ -290,12 +294,14 @@ def street_points(
             frame = frame_views(drive_frames, depth_maps, slice(number, number + 1))
             around = slice(max(number - 3, 0), number + 4)
             neighbours = frame_views(drive_frames, depth_maps, around)
-            confirmed[number] = agreement(frame, neighbours)
+            if number in asked:
+                confirmed[number] = agreement(frame, neighbours)
             yield consistent_points(
                 frame,
                 neighbours,
                 least_support=settings.support,
                 farthest=settings.farthest_point,
+                step=settings.step,
             )
 
     points = fused(parts(), settings.cell)
@@ -327,4 +333,4 @@ def street_points(
             "agreement": (("taken",), confirmed),
         }
     )
-    return dataset, {"points": len(points.positions), "agreement": float(confirmed.mean())}
+    return dataset, {"points": len(points.positions), "agreement": float(np.nanmean(confirmed))}

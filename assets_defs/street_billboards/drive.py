@@ -70,7 +70,8 @@ def check_agreement(drive: Drive, name: str) -> None:
         views.append(
             FrameViews(maps.depth, maps.deviation, pictures, drive.intrinsics, drive.poses[frame])
         )
-    beside = FrameViews(*(np.concatenate(both) for both in zip(views[0], views[2], strict=True)))
+    before, _, after = (view._asdict() for view in views)
+    beside = FrameViews(**{name: np.concatenate([before[name], after[name]]) for name in before})
     found = agreement(views[1], beside)
     if found < LEAST_AGREEMENT:
         raise ValueError(

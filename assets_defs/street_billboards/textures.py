@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
 
-TILE_FRAMES = 8
+TILE_FRAMES = 16
 """Frames of a tile of the road: photographs are loaded tile by tile."""
 
 
@@ -310,7 +310,11 @@ def _photographs(
     from pipelines.street_billboards.view_textures import Photographs
 
     views = frame_views(drive, depths, frames)
+    places = views.poses[:, :3, 3]
     positions = points["positions"].values
+    reach = farthest + 10.0
+    near = (positions > places.min(axis=0) - reach) & (positions < places.max(axis=0) + reach)
+    positions = positions[near.all(axis=1)]
     _, height, width = views.depth.shape
     depth, deviation = views.depth.copy(), views.deviation.copy()
     for number in range(len(depth)):
@@ -322,7 +326,7 @@ def _photographs(
             views.poses[number],
             width,
             height,
-            farthest=farthest + 10.0,
+            farthest=reach,
         )
         depth[number][unknown] = surface[unknown]
         deviation[number][unknown] = 0.1

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.coded_arrays import starts
 from pipelines.street_billboards.plane_resolution import sample_places
 from pipelines.street_billboards.textures import SIDE, CompressedTextures
 
@@ -61,11 +62,6 @@ def decodable(textures: CompressedTextures) -> Decodable:
         textures.first_mask,
         textures.masks,
     )
-
-
-def starts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(b + 1,): where each of groups of so many (b,) begins."""
-    return np.concatenate([np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)])
 
 
 def decoded_views(
@@ -174,7 +170,7 @@ def _one_channel(
     fraction: float,
     out: NDArray[np.float32],
 ) -> None:
-    rank = int(data.ranks[billboard, channel])
+    rank = np.int64(data.ranks[billboard, channel])
     plane = data.first_plane[channel][billboard]
     start = data.first_weight[channel][billboard]
     weights = data.weights[channel]
@@ -252,7 +248,7 @@ def seen_errors(
                 for x in range(SIDE):
                     if states[i, y, x] == seen:
                         for c in range(3):
-                            code = int(buffer[c, y, x] + np.float32(0.5))
-                            off = code - int(colours[i, y, x, c])
+                            code = np.int64(buffer[c, y, x] + np.float32(0.5))
+                            off = code - np.int64(colours[i, y, x, c])
                             total[b] += off * off
                         count[b] += 3

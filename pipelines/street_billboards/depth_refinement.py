@@ -3,15 +3,18 @@
 Semi-global matching is right to a fraction of a pixel, prefers whole ones, and spreads what is near
 over what is beside it. Three steps mend that:
 
-- at edges a pixel takes the disparity of the pixels around it that look like it: the median weighted
-  by likeness and distance (Ma et al., Constant time weighted median filtering for stereo matching and
-  beyond, ICCV 2013);
+- at edges a pixel takes the disparity of the pixels around it that look like it: the median,
+  weighted by likeness and distance (Ma et al., Constant time weighted median filtering for stereo
+  matching and beyond, ICCV 2013);
 - a plane through each pixel's surroundings tells how disparity changes across its window, and the
-  window is moved along that plane until the photographs agree (Lucas and Kanade 1981; Bleyer et al.,
-  PatchMatch stereo, BMVC 2011, for the slanted window);
+  window is moved along that plane until the photographs agree (Lucas and Kanade 1981; the slanted
+  window: Bleyer et al., PatchMatch stereo, BMVC 2011);
 - a plane through the surroundings again, for what noise is left.
 
-Disparities are pixels; nan: unknown. Everything here keeps unknown pixels unknown, but ``filled``.
+Disparities are pixels; nan: unknown. What is unknown stays so, but in ``filled``.
+
+Sums over windows go offset by offset along runs of pixels, whose length is a constant: compiled,
+that takes several pixels at a time.
 """
 
 from __future__ import annotations
@@ -30,10 +33,14 @@ _STEP = 1.0
 """Pixels of disparity that make an edge."""
 _SIDE = 2
 """Pixels that a window reaches to each side."""
-_DAMPING = 60.0
+_DAMPING = np.float32(120.0)
 """Squared grey levels a pixel that texture is weighed against: what noise looks like."""
-_FARTHEST = 0.6
+_FARTHEST = np.float32(0.6)
 """Pixels: what lies farther from the matching's answer is another match."""
+_RUN = 64
+"""Pixels of a row whose windows are summed together."""
+_ON_PLANE = np.float32(0.5)
+"""Pixels from a window's plane within which it is one surface."""
 
 
 class Partner(NamedTuple):
@@ -60,18 +67,19 @@ def refined(
     photograph (h, w, 3) sRGB and grey (h, w) of the same camera. Partners may be occluded: those
     that look different are left out, pixel by pixel.
     """
-    cleaned = _voted(disparity, photograph, _edges(disparity), 7, 7)
-    smooth, across, down = _planes(cleaned, 3, np.float32(0.5))
-    moved, told = _moved(
-        smooth,
-        across,
-        down,
-        np.ascontiguousarray(grey, dtype=np.float32),
-        np.stack([one.grey for one in partners]).astype(np.float32),
-        np.stack([one.turn for one in partners]).astype(np.float32),
-        np.stack([one.shift for one in partners]).astype(np.float32),
-    )
-    return _planes(moved, 2, np.float32(0.4))[0], told
+    cleaned = _voted(disparity, photograph, _edges(disparity), 6, 2)
+    smooth, across, down = _planes(cleaned, 2, 0.5)
+    ours = np.ascontiguousarray(grey, dtype=np.float32)
+    compared = [
+        _compared(smooth, ours, one.grey.astype(np.float32), one.turn, one.shift)
+        for one in partners
+    ]
+    errors, slopes = (np.stack(both) for both in zip(*compared, strict=True))
+    moved, told = _moved(smooth, across, down, ours, errors, slopes)
+    answer = _planes(moved, 2, 0.4)[0]
+    # There, windows hold two surfaces.
+    told[_edges(answer)] *= 0.5
+    return answer, told
 
 
 def filled(disparity: Map, photograph: Photograph) -> Map:
@@ -87,7 +95,7 @@ def filled(disparity: Map, photograph: Photograph) -> Map:
     rows = np.flatnonzero(known.any(axis=1))
     nearest = rows[np.abs(np.arange(len(dense))[:, None] - rows[None, :]).argmin(axis=1)]
     dense = dense[nearest]
-    return np.asarray(_voted(dense, photograph, ~known, 9, 9))
+    return np.asarray(_voted(dense, photograph, ~known, 9, 1))
 
 
 @njit(cache=True, nogil=True)
@@ -145,17 +153,20 @@ def _edges(disparity: Map) -> NDArray[np.bool_]:
 
 @njit(cache=True, nogil=True)
 def _voted(
-    disparity: Map, photograph: Photograph, asked: NDArray[np.bool_], wide: int, high: int
+    disparity: Map, photograph: Photograph, asked: NDArray[np.bool_], side: int, step: int
 ) -> Map:
-    """Where asked, the median of the window's disparities, weighted by likeness and distance."""
+    """Where asked, the median of the window's disparities, weighted by likeness and distance.
+
+    The window reaches ``side`` pixels to each side; each ``step``-th of them has a vote.
+    """
     height, width = disparity.shape
     answer = disparity.copy()
-    most = (2 * wide + 1) * (2 * high + 1)
+    most = (2 * side // step + 1) ** 2
     values, weights = np.empty(most, np.float32), np.empty(most, np.float32)
     likeness = np.exp(-np.arange(766) / 30.0).astype(np.float32)
-    closeness = np.empty((high + 1, wide + 1), np.float32)
-    for j in range(high + 1):
-        for i in range(wide + 1):
+    closeness = np.empty((side + 1, side + 1), np.float32)
+    for j in range(side + 1):
+        for i in range(side + 1):
             closeness[j, i] = np.exp(-np.sqrt(i * i + j * j) / 6.0)
     for y in range(height):
         for x in range(width):
@@ -164,18 +175,21 @@ def _voted(
             red, green, blue = photograph[y, x]
             count = 0
             total = np.float32(0.0)
-            for v in range(max(0, y - high), min(height, y + high + 1)):
-                for u in range(max(0, x - wide), min(width, x + wide + 1)):
-                    value = disparity[v, u]
-                    if not np.isfinite(value):
+            for j in range(-side, side + 1, step):
+                v = y + j
+                if v < 0 or v >= height:
+                    continue
+                for i in range(-side, side + 1, step):
+                    u = x + i
+                    if u < 0 or u >= width or not np.isfinite(disparity[v, u]):
                         continue
                     apart = (
                         abs(np.int32(photograph[v, u, 0]) - np.int32(red))
                         + abs(np.int32(photograph[v, u, 1]) - np.int32(green))
                         + abs(np.int32(photograph[v, u, 2]) - np.int32(blue))
                     )
-                    weight = likeness[apart] * closeness[abs(v - y), abs(u - x)]
-                    values[count] = value
+                    weight = likeness[apart] * closeness[abs(j), abs(i)]
+                    values[count] = disparity[v, u]
                     weights[count] = weight
                     total += weight
                     count += 1
@@ -188,118 +202,201 @@ def _voted(
     return answer
 
 
-@njit(cache=True, nogil=True, fastmath=_RELAXED, error_model="numpy")
-def _planes(disparity: Map, side: int, near: np.float32) -> tuple[Map, Map, Map]:
+def _planes(disparity: Map, side: int, near: float) -> tuple[Map, Map, Map]:
     """Value and slopes across and down of the plane through each pixel's surface.
 
-    Of the window, what is within ``near`` pixels of the plane that the innermost 5 x 5 have.
+    Of the window, what is within a pixel of its middle, then within ``near`` pixels of that plane.
     """
     height, width = disparity.shape
-    smooth = disparity.copy()
-    across, down = np.zeros((height, width), np.float32), np.zeros((height, width), np.float32)
-    for y in range(height):
-        for x in range(width):
-            here = disparity[y, x]
-            if here != here:
-                continue
-            a, b, c = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            for inner in (True, False):
-                reach = 2 if inner else side
-                allowed = np.float32(1.0) if inner else near
-                n = sx = sy = sd = sxx = sxy = syy = sxd = syd = np.float32(0.0)
-                for j in range(max(-reach, -y), min(reach, height - 1 - y) + 1):
-                    for i in range(max(-reach, -x), min(reach, width - 1 - x) + 1):
-                        d = disparity[y + j, x + i] - here
-                        fi, fj = np.float32(i), np.float32(j)
-                        # False for the unknown, too.
-                        if abs(d - a * fi - b * fj - c) < allowed:
-                            n += np.float32(1.0)
-                            sx += fi
-                            sy += fj
-                            sd += d
-                            sxx += fi * fi
-                            sxy += fi * fj
-                            syy += fj * fj
-                            sxd += fi * d
-                            syd += fj * d
-                if n < 6:
-                    break
-                mx, my, md = sx / n, sy / n, sd / n
-                # A little stiffness: three pixels in a row do not tell a slope across them.
-                cxx = sxx / n - mx * mx + np.float32(0.05)
-                cyy = syy / n - my * my + np.float32(0.05)
-                cxy = sxy / n - mx * my
-                cxd, cyd = sxd / n - mx * md, syd / n - my * md
-                det = cxx * cyy - cxy * cxy
-                a = (cxd * cyy - cyd * cxy) / det
-                b = (cyd * cxx - cxd * cxy) / det
-                c = md - a * mx - b * my
-            across[y, x], down[y, x] = a, b
-            if abs(c) < 1:
-                smooth[y, x] = here + c
-    return smooth, across, down
+    fits = _planes_of_runs(_padded(disparity, side), height, width, side, np.float32(near))
+    smooth = np.where(np.abs(fits[0]) < 1, disparity + fits[0], disparity)
+    return smooth, fits[1], fits[2]
+
+
+def _padded(values: Map, side: int) -> Map:
+    """With nan around (…, h, w), and behind it to a whole number of runs."""
+    more = [(0, 0)] * (values.ndim - 2) + [(side, side), (side, side + -values.shape[-1] % _RUN)]
+    return np.pad(values, more, constant_values=np.nan).astype(np.float32, copy=False)
 
 
 @njit(cache=True, nogil=True, fastmath=_RELAXED, error_model="numpy")
-def _moved(
-    disparity: Map, across: Map, down: Map, grey: Map, greys: Map, turns: Map, shifts: Map
-) -> tuple[Map, Map]:
-    """One step of Gauss and Newton on each pixel's window, its differences less their mean."""
+def _planes_of_runs(padded: Map, height: int, width: int, side: int, near: np.float32) -> Map:
+    """(3, height, width): offset from the value and slopes of each pixel's plane."""
+    fits = np.zeros((3, height, width), np.float32)
+    sums = np.zeros(9 * _RUN, np.float32)
+    plane = np.zeros(3 * _RUN, np.float32)
+    one, none = np.float32(1.0), np.float32(0.0)
+    for y in range(height):
+        for start in range(0, width, _RUN):
+            here = padded[y + side, start + side : start + side + _RUN]
+            plane[:] = none
+            for allowed in (one, near):
+                sums[:] = none
+                for j in range(-side, side + 1):
+                    for i in range(-side, side + 1):
+                        fi, fj = np.float32(i), np.float32(j)
+                        begin = start + side + i
+                        there = padded[y + side + j, begin : begin + _RUN]
+                        for x in range(_RUN):
+                            d = there[x] - here[x]
+                            off = d - plane[x] - plane[_RUN + x] * fi - plane[2 * _RUN + x] * fj
+                            counts = abs(off) < allowed  # False for the unknown, too
+                            w = one if counts else none
+                            d = d if counts else none
+                            sums[x] += w
+                            sums[_RUN + x] += w * fi
+                            sums[2 * _RUN + x] += w * fj
+                            sums[3 * _RUN + x] += w * (fi * fi)
+                            sums[4 * _RUN + x] += w * (fi * fj)
+                            sums[5 * _RUN + x] += w * (fj * fj)
+                            sums[6 * _RUN + x] += d
+                            sums[7 * _RUN + x] += d * fi
+                            sums[8 * _RUN + x] += d * fj
+                for x in range(_RUN):
+                    n = sums[x]
+                    each = one / max(n, one)
+                    mx, my, md = sums[_RUN + x], sums[2 * _RUN + x], sums[6 * _RUN + x]
+                    mx, my, md = mx * each, my * each, md * each
+                    # A little stiffness: three pixels in a row do not tell a slope across them.
+                    cxx = sums[3 * _RUN + x] * each - mx * mx + np.float32(0.05)
+                    cyy = sums[5 * _RUN + x] * each - my * my + np.float32(0.05)
+                    cxy = sums[4 * _RUN + x] * each - mx * my
+                    cxd = sums[7 * _RUN + x] * each - mx * md
+                    cyd = sums[8 * _RUN + x] * each - my * md
+                    det = cxx * cyy - cxy * cxy
+                    a, b = (cxd * cyy - cyd * cxy) / det, (cyd * cxx - cxd * cxy) / det
+                    enough = n >= 6
+                    plane[x] = md - a * mx - b * my if enough else none
+                    plane[_RUN + x] = a if enough else none
+                    plane[2 * _RUN + x] = b if enough else none
+            for x in range(min(_RUN, width - start)):
+                for k in range(3):
+                    fits[k, y, start + x] = plane[k * _RUN + x]
+    return fits
+
+
+@njit(cache=True, nogil=True, fastmath=_RELAXED, error_model="numpy")
+def _compared(disparity: Map, grey: Map, other: Map, turn: Map, shift: Map) -> tuple[Map, Map]:
+    """How much brighter each pixel is than in the other photograph, and how that would change.
+
+    Grey levels, and grey levels a pixel of disparity; slope nan where the other does not see it.
+    """
     height, width = disparity.shape
-    partners, rows, columns = greys.shape
-    answer = disparity.copy()
-    told = np.zeros((height, width), np.float32)
+    rows, columns = other.shape
+    error = np.zeros((height, width), np.float32)
+    slope = np.full((height, width), np.nan, np.float32)
+    seen = np.zeros(2, np.float32)
     one = np.float32(1.0)
-    for y in range(_SIDE, height - _SIDE):
-        for x in range(_SIDE, width - _SIDE):
-            here = disparity[y, x]
-            if here != here:
+    for y in range(height):
+        for x in range(width):
+            if disparity[y, x] != disparity[y, x]:
                 continue
-            middle = grey[y, x]
-            pull = push = np.float32(0.0)
-            for k in range(partners):
-                turn, shift = turns[k], shifts[k]
-                weights = errors = slopes = both = square = spread = np.float32(0.0)
+            fx, fy = np.float32(x), np.float32(y)
+            inside = True
+            for k in range(2):
+                d = disparity[y, x] + (np.float32(0.5) if k else np.float32(-0.5))
+                w = one / (turn[2, 0] * fx + turn[2, 1] * fy + turn[2, 2] + d * shift[2])
+                u = (turn[0, 0] * fx + turn[0, 1] * fy + turn[0, 2] + d * shift[0]) * w
+                v = (turn[1, 0] * fx + turn[1, 1] * fy + turn[1, 2] + d * shift[1]) * w
+                # The last row has no next: half a pixel of slack, not to lose it.
+                if not (u >= 0 and v >= -0.5 and u < columns - 1 and v < rows - 0.5):
+                    inside = False
+                    break
+                v = min(max(v, np.float32(0.0)), np.float32(rows - 1.001))
+                g, h = int(u), int(v)
+                f, t = u - np.float32(g), v - np.float32(h)
+                top = other[h, g] + (other[h, g + 1] - other[h, g]) * f
+                low = other[h + 1, g] + (other[h + 1, g + 1] - other[h + 1, g]) * f
+                seen[k] = top + (low - top) * t
+            if inside:
+                error[y, x] = grey[y, x] - np.float32(0.5) * (seen[0] + seen[1])
+                slope[y, x] = seen[1] - seen[0]
+    return error, slope
+
+
+def _moved(
+    disparity: Map, across: Map, down: Map, grey: Map, errors: Map, slopes: Map
+) -> tuple[Map, Map]:
+    """One step of Gauss and Newton for each pixel's window, and how much the photographs told.
+
+    errors, slopes (k, h, w): as ``_compared`` has them. Each partner's differences count less their
+    mean: what it sees may be brighter there.
+    """
+    height, width = disparity.shape
+    step, told = _steps_of_runs(
+        _padded(disparity, _SIDE),
+        _padded(across, _SIDE),
+        _padded(down, _SIDE),
+        _padded(grey, _SIDE),
+        _padded(errors, _SIDE),
+        _padded(slopes, _SIDE),
+        height,
+        width,
+    )
+    taken = np.abs(step) <= _FARTHEST
+    return np.where(taken, disparity + step, disparity), np.where(taken, told, 0)
+
+
+@njit(cache=True, nogil=True, fastmath=_RELAXED, error_model="numpy")
+def _steps_of_runs(
+    disparity: Map,
+    across: Map,
+    down: Map,
+    grey: Map,
+    errors: Map,
+    slopes: Map,
+    height: int,
+    width: int,
+) -> tuple[Map, Map]:
+    steps, told = np.zeros((height, width), np.float32), np.zeros((height, width), np.float32)
+    sums = np.zeros(6 * _RUN, np.float32)
+    pull, push = np.zeros(_RUN, np.float32), np.zeros(_RUN, np.float32)
+    one, none = np.float32(1.0), np.float32(0.0)
+    for y in range(height):
+        row = y + _SIDE
+        for start in range(0, width, _RUN):
+            begin = start + _SIDE
+            here, own = disparity[row, begin : begin + _RUN], grey[row, begin : begin + _RUN]
+            ax, ay = across[row, begin : begin + _RUN], down[row, begin : begin + _RUN]
+            pull[:] = none
+            push[:] = none
+            for k in range(len(errors)):
+                sums[:] = none
                 for j in range(-_SIDE, _SIDE + 1):
                     for i in range(-_SIDE, _SIDE + 1):
-                        px, py = np.float32(x + i), np.float32(y + j)
-                        d = here + across[y, x] * np.float32(i) + down[y, x] * np.float32(j)
-                        w = one / (turn[2, 0] * px + turn[2, 1] * py + turn[2, 2] + d * shift[2])
-                        u = (turn[0, 0] * px + turn[0, 1] * py + turn[0, 2] + d * shift[0]) * w
-                        v = (turn[1, 0] * px + turn[1, 1] * py + turn[1, 2] + d * shift[1]) * w
-                        # The last row has no next: half a pixel of slack, not to lose it.
-                        if not (u >= 0 and v >= -0.5 and u < columns - 1 and v < rows - 0.5):
-                            continue
-                        v = min(max(v, np.float32(0.0)), np.float32(rows - 1.001))
-                        g, h = int(u), int(v)
-                        f, t = u - np.float32(g), v - np.float32(h)
-                        nw, ne = greys[k, h, g], greys[k, h, g + 1]
-                        sw, se = greys[k, h + 1, g], greys[k, h + 1, g + 1]
-                        top, low = nw + (ne - nw) * f, sw + (se - sw) * f
-                        seen = top + (low - top) * t
-                        slope = ((ne - nw) * (one - t) + (se - sw) * t) * (
-                            shift[0] - u * shift[2]
-                        ) * w + (low - top) * (shift[1] - v * shift[2]) * w
-                        error = grey[y + j, x + i] - seen
-                        unlike = grey[y + j, x + i] - middle
-                        weight = one / (one + unlike * unlike * np.float32(1 / 800))
-                        weights += weight
-                        errors += weight * error
-                        slopes += weight * slope
-                        both += weight * slope * error
-                        square += weight * slope * slope
-                        spread += weight * error * error
-                if weights < 2:
-                    continue
-                both -= slopes * errors / weights
-                square -= slopes * slopes / weights
-                spread = (spread - errors * errors / weights) / weights
-                # What does not look alike is hidden there.
-                sure = one / (one + spread * np.float32(1 / 150))
-                pull += sure * both
-                push += sure * square
-            step = pull / (push + np.float32(_DAMPING))
-            if abs(step) <= _FARTHEST:
-                answer[y, x] = here + step
-                told[y, x] = push / (push + np.float32(_DAMPING))
-    return answer, told
+                        fi, fj = np.float32(i), np.float32(j)
+                        at = begin + i
+                        there = disparity[row + j, at : at + _RUN]
+                        looks = grey[row + j, at : at + _RUN]
+                        e = errors[k, row + j, at : at + _RUN]
+                        g = slopes[k, row + j, at : at + _RUN]
+                        for x in range(_RUN):
+                            # The plane at that pixel, less the disparity it was compared at.
+                            ahead = here[x] + ax[x] * fi + ay[x] * fj - there[x]
+                            counts = (abs(ahead) < _ON_PLANE) & (g[x] == g[x])
+                            slope = g[x] if counts else none
+                            error = e[x] - g[x] * ahead if counts else none
+                            unlike = looks[x] - own[x]
+                            w = one / (one + unlike * unlike * np.float32(1 / 800))
+                            w = w if counts else none
+                            sums[x] += w
+                            sums[_RUN + x] += w * error
+                            sums[2 * _RUN + x] += w * slope
+                            sums[3 * _RUN + x] += w * error * slope
+                            sums[4 * _RUN + x] += w * slope * slope
+                            sums[5 * _RUN + x] += w * error * error
+                for x in range(_RUN):
+                    weight, e_sum, g_sum = sums[x], sums[_RUN + x], sums[2 * _RUN + x]
+                    each = one / max(weight, one)
+                    both = sums[3 * _RUN + x] - e_sum * g_sum * each
+                    square = sums[4 * _RUN + x] - g_sum * g_sum * each
+                    spread = (sums[5 * _RUN + x] - e_sum * e_sum * each) * each
+                    # What does not look alike is hidden there.
+                    sure = one / (one + spread * np.float32(1 / 150))
+                    sure = sure if weight >= 2 else none
+                    pull[x] += sure * both
+                    push[x] += sure * square
+            for x in range(min(_RUN, width - start)):
+                steps[y, start + x] = pull[x] / (push[x] + _DAMPING)
+                told[y, start + x] = push[x] / (push[x] + _DAMPING)
+    return steps, told

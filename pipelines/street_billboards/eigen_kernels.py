@@ -7,10 +7,13 @@ cancels the chroma's error in R + G + B.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.coded_arrays import CodedArrays
 from pipelines.street_billboards.low_rank_fit import (
     FloatArray,
     refined,
@@ -35,6 +38,19 @@ _GUESS = 0.1
 """How much a texel counts that was not seen, but by others."""
 _SHARPENING = 6
 _MEAN_SWEEPS = 2
+
+
+class Sampled(NamedTuple):
+    """What kernels read of ViewTextures, and how they are to look at it."""
+
+    first: Ints
+    colours: Bytes
+    states: Bytes
+    view_weights: FloatArray
+    """(v,)."""
+    luma_chroma: bool
+    sides: Ints
+    """(3,), of planes."""
 
 
 @njit(cache=True, nogil=True)
@@ -136,12 +152,7 @@ def first_planes(
 
 @njit(cache=True, nogil=True)
 def rank_errors(
-    first: Ints,
-    colours: Bytes,
-    states: Bytes,
-    view_weights: FloatArray,
-    luma_chroma: bool,
-    sides: Ints,
+    data: Sampled,
     most: Ints,
     enough: float,
     ridge: float,
@@ -155,8 +166,8 @@ def rank_errors(
     """
     errors[:] = np.inf
     for b in range(len(errors)):
-        begin, end = first[b], first[b + 1]
-        counted = counted_of(states[begin:end], view_weights[begin:end])
+        begin, end = data.first[b], data.first[b + 1]
+        counted = counted_of(data.states[begin:end], data.view_weights[begin:end])
         mass = counted.sum()
         if mass <= 0.0:
             errors[b, :, 0] = 0.0
@@ -164,14 +175,14 @@ def rank_errors(
         known = 0
         for i in range(end - begin):
             known += (counted[i] > 0.0).any()
-        channels = channels_of(colours[begin:end], luma_chroma)
+        channels = channels_of(data.colours[begin:end], data.luma_chroma)
         guess_gaps(channels, counted)
         for c in range(3):
             limit = min(known, most[c])
-            start = first_planes(channels[c], counted, limit, sides[c])
+            start = first_planes(channels[c], counted, limit, data.sides[c])
             for rank in range(limit + 1):
                 errors[b, c, rank] = fit_planes(
-                    channels[c], counted, start, rank, sides[c], ridge, sweeps
+                    channels[c], counted, start, rank, data.sides[c], ridge, sweeps
                 )[3]
                 if errors[b, c, rank] <= enough * mass:
                     break
@@ -225,35 +236,19 @@ def code_planes(
 
 @njit(cache=True, nogil=True)
 def code_billboards(
-    first: Ints,
-    colours: Bytes,
-    states: Bytes,
-    view_weights: FloatArray,
-    luma_chroma: bool,
-    sides: Ints,
-    ridge: float,
-    sweeps: int,
-    ranks: Bytes,
-    first_plane: tuple[Ints, Ints, Ints],
-    first_weight: tuple[Ints, Ints, Ints],
-    means: Bytes,
-    planes: tuple[Bytes, Bytes, Bytes],
-    scales: tuple[FloatArray, FloatArray, FloatArray],
-    weights: tuple[Bytes, Bytes, Bytes],
+    data: Sampled, arrays: CodedArrays, begin_at: int, end_at: int, ridge: float, sweeps: int
 ) -> None:
-    """Fit and code billboards of given ranks (b, 3), into the arrays of CompressedTextures.
-
-    planes are (r, side²) here; first_plane, first_weight: (b + 1,) by channel.
-    """
-    for b in range(len(ranks)):
-        begin, end = first[b], first[b + 1]
+    """Fit and code billboards ``begin_at`` to ``end_at``, of the ranks that ``arrays`` have."""
+    sides = data.sides
+    for b in range(begin_at, end_at):
+        begin, end = data.first[b], data.first[b + 1]
         if begin == end:
             continue
-        counted = counted_of(states[begin:end], view_weights[begin:end])
-        channels = channels_of(colours[begin:end], luma_chroma)
+        counted = counted_of(data.states[begin:end], data.view_weights[begin:end])
+        channels = channels_of(data.colours[begin:end], data.luma_chroma)
         guess_gaps(channels, counted)
         for c in (2, 1, 0):
-            rank = int(ranks[b, c])
+            rank = int(arrays.ranks[b, c])
             start = first_planes(channels[c], counted, rank, sides[c])
             middle, amounts, images, _ = fit_planes(
                 channels[c], counted, start, rank, sides[c], ridge, sweeps
@@ -262,7 +257,7 @@ def code_billboards(
                 fill_unknown(images, counted, SIDE)
             else:
                 fill_unknown(images, reduced(channels[c], counted, sides[c])[1], sides[c])
-            plane, weight = first_plane[c][b], first_weight[c][b]
+            plane, weight = arrays.first_plane[c][b], arrays.first_weight[c][b]
             code_planes(
                 channels[c],
                 counted,
@@ -270,12 +265,12 @@ def code_billboards(
                 amounts,
                 images,
                 sides[c],
-                means[begin:end, c],
-                planes[c][plane : plane + rank],
-                scales[c][plane : plane + rank],
-                weights[c][weight : weight + rank * (end - begin)],
+                arrays.means[begin:end, c],
+                arrays.planes[c][plane : plane + rank],
+                arrays.scales[c][plane : plane + rank],
+                arrays.weights[c][weight : weight + rank * (end - begin)],
             )
-            if c == 2 and luma_chroma:
+            if c == 2 and data.luma_chroma:
                 large = enlarged(images, sides[c])
                 for i in range(end - begin):
                     for p in range(SIDE * SIDE):

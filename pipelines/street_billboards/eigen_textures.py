@@ -10,31 +10,51 @@ for bytes holds for all of them (a Lagrange multiplier), searched until the erro
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal
+from typing import Literal, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.decoding import decodable, seen_errors, starts
+from pipelines.street_billboards.coded_arrays import CodedArrays, as_textures, blank, starts
+from pipelines.street_billboards.decoding import decodable, seen_errors
 from pipelines.street_billboards.eigen_kernels import (
     LUMA_CHROMA_WEIGHTS,
+    Sampled,
     code_billboards,
     rank_errors,
 )
 from pipelines.street_billboards.low_rank_fit import RIDGE
-from pipelines.street_billboards.paper_kernels import code_paper, paper_squares
+from pipelines.street_billboards.paper_form import (
+    code_paper,
+    masks_of_directions,
+    nearest_views,
+    paper_squares,
+    reaching,
+)
+from pipelines.street_billboards.rank_choice import Choice, chosen
 from pipelines.street_billboards.texture_masks import masks_of
 from pipelines.street_billboards.textures import SEEN, SIDE, CompressedTextures, ViewTextures
 from pipelines.street_billboards.view_directions import DIRECTIONS
 
+_SIDES = (4, 8, 16, 32)
 _SCALE_BYTES = 4
 _CURVE_SWEEPS, _SWEEPS = 4, 10
 _NEGLIGIBLE = 0.02
 """Of the squared error asked for: what is left below that ends a billboard's curve."""
 _PASSES = 4
 _NEAR = 0.99
+
+
+class Part(NamedTuple):
+    """Billboards whose planes have the same sides."""
+
+    billboards: NDArray[np.int64]
+    """(k,), rows of the views' table, rising."""
+    textures: CompressedTextures
+    """Of these k."""
 
 
 def compressed(
@@ -56,33 +76,113 @@ def compressed(
 
     Raises ValueError where an option is none of these.
     """
-    _check(views, turns, error, colour, chroma_side)
-    sides = np.array([SIDE, chroma_side, chroma_side] if colour == "ycocg" else [SIDE] * 3)
-    importance = LUMA_CHROMA_WEIGHTS if colour == "ycocg" else np.ones(3)
-    coder = _Coder(views, turns, colour == "ycocg", sides, view_weights)
-    squares = coder.rank_errors(np.array(most_ranks), _NEGLIGIBLE * error**2)
-    squares *= importance[:, None]
-    sizes = np.diff(views.first)[:, None] + (sides**2 + _SCALE_BYTES)[None, :]
-    costs = sizes[:, :, None] * np.arange(squares.shape[2])
+    forms = ((SIDE, chroma_side),) if colour == "ycocg" else ((SIDE, SIDE),)
+    made = _searched(views, turns, error, colour, forms, most_ranks, view_weights)
+    return made[0].textures
+
+
+def compressed_by_resolution(
+    views: ViewTextures,
+    turns: NDArray[np.bool_],
+    *,
+    error: float,
+    forms: Sequence[tuple[int, int]] = ((32, 16), (16, 8)),
+    most_ranks: tuple[int, int, int] = (8, 4, 4),
+    view_weights: NDArray[np.floating] | None = None,
+) -> list[Part]:
+    """Like `compressed` in Y, Co, Cg, each billboard in that of the resolutions that pays.
+
+    forms: sides of luma and chroma, 4, 8, 16 or 32 texels each. What was photographed from afar is
+    blurry: half the side is a quarter of the bytes, and more planes can be had for them. A part for
+    each form, in their order; one without billboards is empty.
+    """
+    return _searched(views, turns, error, "ycocg", forms, most_ranks, view_weights)
+
+
+def _searched(
+    views: ViewTextures,
+    turns: NDArray[np.bool_],
+    error: float,
+    colour: str,
+    forms: Sequence[tuple[int, int]],
+    most_ranks: tuple[int, int, int],
+    view_weights: NDArray[np.floating] | None,
+) -> list[Part]:
+    _check(views, turns, error, colour, forms)
+    luma_chroma = colour == "ycocg"
+    importance = LUMA_CHROMA_WEIGHTS if luma_chroma else np.ones(3)
+    weights = np.ones(len(views.direction)) if view_weights is None else view_weights
+    weights = np.asarray(weights, np.float32)
+    all_squares, all_costs = [], []
+    for luma, chroma in forms:
+        sides = np.array([luma, chroma, chroma])
+        data = _sampled(views, weights, luma_chroma, sides)
+        squares = _rank_errors(data, np.array(most_ranks), _NEGLIGIBLE * error**2)
+        plane_bytes = np.diff(data.first)[:, None] + sides**2 + _SCALE_BYTES
+        all_squares.append(squares * importance[:, None])
+        all_costs.append(plane_bytes[:, :, None] * np.arange(squares.shape[2]))
+    squares, costs = np.stack(all_squares), np.stack(all_costs)
+
+    def coded(choice: Choice) -> tuple[list[Part], float]:
+        parts, total = [], 0.0
+        for form, (luma, chroma) in enumerate(forms):
+            rows = np.flatnonzero(choice.form == form)
+            own, view_rows = _taken(views, rows)
+            sides = np.array([luma, chroma, chroma])
+            data = _sampled(own, weights[view_rows], luma_chroma, sides)
+            first_mask, masks = masks_of(own, turns[rows])
+            textures = as_textures(
+                _coded(data, choice.ranks[rows]),
+                colour=colour,
+                first=data.first,
+                direction=own.direction,
+                sides=sides,
+                first_mask=first_mask,
+                masks=masks,
+            )
+            parts.append(Part(rows, textures))
+            total += float(_squared_errors(own, textures).sum())
+        return parts, total
+
     allowed = error**2 * 3.0 * float((views.states == SEEN).sum())
-    # Rounding to 8 bit adds a little to what the curves foretell: aim lower by what it added.
-    aim = allowed
-    best: CompressedTextures | None = None
+    aim, found = allowed, None
     for _ in range(_PASSES):
-        ranks = _chosen(squares, costs, aim)
-        made = coder.coded(ranks)
-        total = _squared_errors(views, made).sum()
-        if total <= allowed or best is None:
-            best = made
+        choice = chosen(squares, costs, aim)
+        parts, total = coded(choice)
+        if total <= allowed or found is None:
+            found = parts
         if _NEAR * allowed <= total <= allowed:
             break
-        foretold = np.take_along_axis(squares, ranks[:, :, None].astype(np.int64), 2).sum()
-        lower = allowed - (total - foretold)
-        if lower <= 0.0 or ranks.sum() == 0:
+        # Rounding to 8 bit adds a little to what the curves foretell: aim lower by as much.
+        aim = allowed - (total - choice.squares)
+        if aim <= 0.0:
             break
-        aim = lower
-    assert best is not None
-    return best
+    assert found is not None
+    return found
+
+
+def _sampled(
+    views: ViewTextures,
+    weights: NDArray[np.float32],
+    luma_chroma: bool,
+    sides: NDArray[np.int64],
+) -> Sampled:
+    first = views.first.astype(np.int64)
+    return Sampled(first, views.colours, views.states, weights, luma_chroma, sides)
+
+
+def _taken(
+    views: ViewTextures, billboards: NDArray[np.int64]
+) -> tuple[ViewTextures, NDArray[np.int64]]:
+    """The views of some billboards, and their rows."""
+    counts = np.diff(views.first)
+    if len(billboards) == len(counts):
+        return views, np.arange(len(views.direction))
+    first = starts(counts[billboards])
+    rows = np.repeat(views.first[billboards] - first[:-1], counts[billboards]) + np.arange(
+        first[-1]
+    )
+    return ViewTextures(first, *(array[rows] for array in views[1:])), rows
 
 
 def compressed_paper(
@@ -100,7 +200,7 @@ def compressed_paper(
 
     Raises ValueError where neither is given, or out of range.
     """
-    _check(views, turns, 1.0, "rgb", SIDE)
+    _check(views, turns, 1.0, "rgb", ())
     if rank is None and contribution is None:
         raise ValueError("rank and contribution are None; expected one of them.")
     if rank is not None and not 0 <= rank <= DIRECTIONS:
@@ -108,216 +208,77 @@ def compressed_paper(
     if contribution is not None and not 0.0 < contribution <= 1.0:
         raise ValueError(f"contribution is {contribution}; expected more than 0, 1 at most.")
     count = len(turns)
-    nearest = _nearest_views(views)
+    nearest = nearest_views(views)
     shares = np.bincount(nearest[nearest >= 0], minlength=len(views.direction))
     data = (views.first, views.colours, views.states, shares.astype(np.float32))
     if contribution is None:
         ranks = np.full((count, 3), rank, np.uint8)
     else:
         squares = np.zeros((count, 3, DIRECTIONS))
-        paper_squares(*data, squares)
-        ranks = _reaching(squares, contribution)
+        paper_squares(data[0], data[1], data[2], data[3], squares)
+        ranks = reaching(squares, contribution)
         if rank is not None:
             ranks = np.minimum(ranks, np.uint8(rank))
-    stored = ranks.astype(np.int64)
-    first_plane = [starts(stored[:, c]) for c in range(3)]
-    first_weight = [starts(DIRECTIONS * stored[:, c]) for c in range(3)]
-    means = np.full((count * DIRECTIONS, 3), 128, np.uint8)
-    planes = [np.full((f[-1], SIDE * SIDE), 128, np.uint8) for f in first_plane]
-    scales = [np.zeros(f[-1], np.float32) for f in first_plane]
-    weights = [np.full(f[-1], 128, np.uint8) for f in first_weight]
-    code_paper(
-        *data,
-        nearest,
-        ranks,
-        tuple(first_plane),
-        tuple(first_weight),
-        means,
-        tuple(planes),
-        tuple(scales),
-        tuple(weights),
-    )
-    first_mask, masks = _masks_of_directions(views, turns, nearest)
-    shaped = [p.reshape(-1, SIDE, SIDE) for p in planes]
-    return CompressedTextures(
-        "rgb",
-        np.arange(count + 1) * DIRECTIONS,
-        np.tile(np.arange(DIRECTIONS, dtype=np.uint8), count),
-        means,
-        ranks,
-        (shaped[0], shaped[1], shaped[2]),
-        (scales[0], scales[1], scales[2]),
-        (weights[0], weights[1], weights[2]),
-        first_mask,
-        masks,
+    sides = np.full(3, SIDE)
+    arrays = blank(ranks, np.full(count, DIRECTIONS), sides)
+    code_paper(data[0], data[1], data[2], data[3], nearest, arrays)
+    first_mask, masks = masks_of_directions(views, turns, nearest)
+    return as_textures(
+        arrays,
+        colour="rgb",
+        first=np.arange(count + 1) * DIRECTIONS,
+        direction=np.tile(np.arange(DIRECTIONS, dtype=np.uint8), count),
+        sides=sides,
+        first_mask=first_mask,
+        masks=masks,
     )
 
 
-def _nearest_views(views: ViewTextures) -> NDArray[np.int64]:
-    """(b, 32) rows of the views nearest to each direction, -1 for a billboard without any."""
-    counts = np.diff(views.first)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    apart = np.full((len(counts), DIRECTIONS), 2 * DIRECTIONS)
-    nearest = np.full((len(counts), DIRECTIONS), -1, np.int64)
-    # The n-th view of every billboard that has as many; the first of two that are as near stays.
-    for n in range(int(counts.max(initial=0))):
-        rows = (views.first[:-1] + n)[counts > n]
-        far = np.abs(views.direction[rows, None].astype(np.int64) - np.arange(DIRECTIONS))
-        better = far < apart[owner[rows]]
-        nearest[owner[rows]] = np.where(better, rows[:, None], nearest[owner[rows]])
-        apart[owner[rows]] = np.where(better, far, apart[owner[rows]])
-    return nearest
+def _in_parts(work: Callable[[slice], None], count: int) -> None:
+    """``work`` on parts of so many billboards, one for each thread that numba may use."""
+    workers = min(numba.get_num_threads(), max(count, 1))
+    edges = np.linspace(0, count, workers + 1).astype(int)
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(work, [slice(a, b) for a, b in itertools.pairwise(edges)]))
 
 
-def _reaching(squares: NDArray[np.float64], contribution: float) -> NDArray[np.uint8]:
-    """How many of squared singular values (b, 3, 32), falling, add up to a share of all."""
-    total = squares.sum(axis=2, keepdims=True)
-    # A hair less, so that the share 1 does not hang on rounding.
-    short = np.cumsum(squares, axis=2) < contribution * (1.0 - 1e-6) * total
-    return np.where(total[..., 0] > 0.0, short.sum(axis=2) + 1, 0).astype(np.uint8)
+def _rank_errors(data: Sampled, most: NDArray[np.int64], enough: float) -> NDArray[np.float64]:
+    """(b, 3, most + 1) sums of squares that ranks would leave, infinity where there is none."""
+    errors = np.empty((len(data.first) - 1, 3, int(most.max()) + 1))
+
+    def work(part: slice) -> None:
+        own = data._replace(first=data.first[part.start : part.stop + 1])
+        rank_errors(own, most, enough, RIDGE, _CURVE_SWEEPS, errors[part])
+
+    _in_parts(work, len(errors))
+    return errors
 
 
-def _masks_of_directions(
-    views: ViewTextures, turns: NDArray[np.bool_], nearest: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-    """Masks of the observed views, for all 32 directions of what turns."""
-    first, masks = masks_of(views, turns)
-    first_mask = starts(np.where(turns, DIRECTIONS, 1))
-    result = np.zeros((first_mask[-1], SIDE, SIDE // 8), np.uint8)
-    result[first_mask[:-1][~turns]] = masks[first[:-1][~turns]]
-    observed = turns & (np.diff(views.first) > 0)
-    rows = nearest[observed] + (first[:-1] - views.first[:-1])[observed, None]
-    result[first_mask[:-1][observed, None] + np.arange(DIRECTIONS)] = masks[rows]
-    return first_mask, result
+def _coded(data: Sampled, ranks: NDArray[np.uint8]) -> CodedArrays:
+    """Everything fitted and coded with these ranks (b, 3)."""
+    arrays = blank(ranks, np.diff(data.first), data.sides)
 
+    def work(part: slice) -> None:
+        code_billboards(data, arrays, part.start, part.stop, RIDGE, _SWEEPS)
 
-class _Coder:
-    """Kernels over all billboards, shared out among threads."""
-
-    def __init__(
-        self,
-        views: ViewTextures,
-        turns: NDArray[np.bool_],
-        luma_chroma: bool,
-        sides: NDArray[np.int64],
-        view_weights: NDArray[np.floating] | None,
-    ) -> None:
-        self.views = views
-        self.luma_chroma = luma_chroma
-        self.sides = sides
-        self.count = len(views.first) - 1
-        self.first_mask, self.masks = masks_of(views, turns)
-        weights = np.ones(len(views.direction)) if view_weights is None else view_weights
-        self.view_weights = np.asarray(weights, np.float32)
-
-    def _parts(self) -> list[slice]:
-        workers = min(numba.get_num_threads(), max(self.count, 1))
-        edges = np.linspace(0, self.count, workers + 1).astype(int)
-        return [slice(a, b) for a, b in itertools.pairwise(edges)]
-
-    def _arguments(self, part: slice) -> tuple[Any, ...]:
-        return (
-            self.views.first[part.start : part.stop + 1],
-            self.views.colours,
-            self.views.states,
-            self.view_weights,
-            self.luma_chroma,
-            self.sides,
-        )
-
-    def rank_errors(self, most: NDArray[np.int64], enough: float) -> NDArray[np.float64]:
-        """(b, 3, most + 1) sums of squares that ranks would leave, infinity where there is none."""
-        errors = np.empty((self.count, 3, int(most.max()) + 1))
-
-        def work(part: slice) -> None:
-            rank_errors(*self._arguments(part), most, enough, RIDGE, _CURVE_SWEEPS, errors[part])
-
-        with ThreadPoolExecutor() as pool:
-            list(pool.map(work, self._parts()))
-        return errors
-
-    def coded(self, ranks: NDArray[np.uint8]) -> CompressedTextures:
-        """Everything fitted and coded with these ranks (b, 3)."""
-        counts = np.diff(self.views.first)
-        many = ranks.astype(np.int64)
-        first_plane = [starts(many[:, c]) for c in range(3)]
-        first_weight = [starts(many[:, c] * counts) for c in range(3)]
-        means = np.zeros((len(self.views.direction), 3), np.uint8)
-        planes = [
-            np.empty((f[-1], side * side), np.uint8)
-            for f, side in zip(first_plane, self.sides, strict=True)
-        ]
-        scales = [np.empty(f[-1], np.float32) for f in first_plane]
-        weights = [np.empty(f[-1], np.uint8) for f in first_weight]
-
-        def work(part: slice) -> None:
-            edges = slice(part.start, part.stop + 1)
-            code_billboards(
-                *self._arguments(part),
-                RIDGE,
-                _SWEEPS,
-                ranks[part],
-                tuple(f[edges] for f in first_plane),
-                tuple(f[edges] for f in first_weight),
-                means,
-                tuple(planes),
-                tuple(scales),
-                tuple(weights),
-            )
-
-        with ThreadPoolExecutor() as pool:
-            list(pool.map(work, self._parts()))
-        shaped = [p.reshape(-1, s, s) for p, s in zip(planes, self.sides, strict=True)]
-        return CompressedTextures(
-            "ycocg" if self.luma_chroma else "rgb",
-            self.views.first.astype(np.int64),
-            self.views.direction,
-            means,
-            ranks,
-            (shaped[0], shaped[1], shaped[2]),
-            (scales[0], scales[1], scales[2]),
-            (weights[0], weights[1], weights[2]),
-            self.first_mask,
-            self.masks,
-        )
-
-
-def _chosen(
-    squares: NDArray[np.float64], costs: NDArray[np.float64], allowed: float
-) -> NDArray[np.uint8]:
-    """Ranks (b, 3) of the fewest bytes whose sum of squares is ``allowed`` at most, on hulls.
-
-    squares, costs (b, 3, ranks). The exchange rate is found by bisection, so the result does not
-    depend on the order of billboards.
-    """
-
-    def ranks_at(rate: float) -> NDArray[np.int64]:
-        return (squares + rate * costs).argmin(axis=2)
-
-    def left(ranks: NDArray[np.int64]) -> float:
-        return float(np.take_along_axis(squares, ranks[:, :, None], 2).sum())
-
-    low, high = -20.0, 40.0
-    if left(ranks_at(2.0**low)) > allowed:
-        return ranks_at(0.0).astype(np.uint8)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        if left(ranks_at(2.0**middle)) <= allowed:
-            low = middle
-        else:
-            high = middle
-    return ranks_at(2.0**low).astype(np.uint8)
+    _in_parts(work, len(ranks))
+    return arrays
 
 
 def _check(
-    views: ViewTextures, turns: NDArray[np.bool_], error: float, colour: str, chroma_side: int
+    views: ViewTextures,
+    turns: NDArray[np.bool_],
+    error: float,
+    colour: str,
+    forms: Sequence[tuple[int, int]],
 ) -> None:
     if len(turns) != len(views.first) - 1:
         raise ValueError(f"turns has {len(turns)} entries; expected {len(views.first) - 1}.")
     if colour not in ("ycocg", "rgb"):
         raise ValueError(f'colour is "{colour}"; expected "ycocg" or "rgb".')
-    if chroma_side not in (8, 16, 32):
-        raise ValueError(f"chroma_side is {chroma_side}; expected 8, 16 or 32.")
+    for luma, chroma in forms:
+        if luma not in _SIDES or chroma not in _SIDES:
+            raise ValueError(f"sides are {luma} and {chroma}; expected 4, 8, 16 or 32 texels.")
     if not error > 0.0:
         raise ValueError(f"error is {error}; expected more than 0 codes.")
 

@@ -38,7 +38,9 @@ def exposure_gains(
             matrix -= _shared(point, photograph, weight, total, photographs)
             mean = np.bincount(point, weight * logs[:, channel], points) / total
             right = np.bincount(photograph, weight * (logs[:, channel] - mean[point]), photographs)
-            matrix[np.diag_indices(photographs)] += 1e-6 * max(float(matrix.trace()), 1e-9)
+            # Just enough to have a solution: a drift along many photographs is held by little more.
+            typical = float(matrix.trace()) / max(photographs, 1)
+            matrix[np.diag_indices(photographs)] += 1e-9 * max(typical, 1e-9)
             found = np.linalg.solve(matrix, right)
             found -= found.mean()
             rest = logs[:, channel] - found[photograph]

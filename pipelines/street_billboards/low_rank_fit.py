@@ -56,7 +56,7 @@ def fitted(
         counted *= np.asarray(view_weights, np.float32)[:, None]
     data = np.ascontiguousarray(values, np.float32)
     means, weights, images = started(data, counted, rank)
-    refined(data, counted, means, weights, images, np.float32(ridge), sweeps)
+    refined(data, counted, means, weights, images, ridge, sweeps)
     return means, weights, images
 
 
@@ -372,5 +372,5 @@ def squared_error(
         part = np.float32(0.0)
         for p in range(texels):
             part += counted[i, p] * off[p] * off[p]
-        total += part
+        total += float(part)
     return total

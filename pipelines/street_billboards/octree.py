@@ -47,7 +47,7 @@ def octree_leaves(positions: NDArray[np.floating], side: float, least: int) -> L
         raise ValueError("points: found none; expected some to put an octree around.")
     corner = np.floor(positions.min(axis=0) / side) * side
     across = float((positions.max(axis=0) - corner).max())
-    depth = max(math.ceil(math.log2(max(across / side, 1.0) * (1.0 + 1e-12))), 0)
+    depth = math.ceil(math.log2(max(across / side * (1.0 + 1e-12), 1.0)))
     if depth > MOST_DEPTH:
         raise ValueError(
             f"voxel is {side:g} m for points {across:g} m across: {depth} levels of an octree; "
@@ -85,7 +85,8 @@ def neighbours(cell: NDArray[np.int64]) -> NDArray[np.int64]:
     found = np.full((len(cell), len(steps)), -1, np.int64)
     for number, step in enumerate(steps):
         beside = cell + step
-        inside = (beside >= 0).all(axis=1)
+        # A code holds no more bits: the cell after the last would pass for the first.
+        inside = ((beside >= 0) & (beside < 2**MOST_DEPTH)).all(axis=1)
         wanted = morton_codes(np.maximum(beside, 0))
         at = np.minimum(np.searchsorted(code, wanted), len(code) - 1)
         found[:, number] = np.where(inside & (code[at] == wanted), at, -1)

@@ -42,7 +42,7 @@ class SkyView(NamedTuple):
     """(4, 4)."""
 
 
-def sky_map(views: Sequence[SkyView], height: int = 96) -> NDArray[np.float32]:
+def sky_map(views: Sequence[SkyView], height: int = 256) -> NDArray[np.float32]:
     """Mean radiance (height, 2 height, 3), z up, laid out as ``stage.Stage`` takes it.
 
     Directions that no photograph shows take the nearest that one does; below the horizon, the

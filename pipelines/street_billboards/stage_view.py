@@ -400,15 +400,29 @@ def _fragment(page: Page) -> str:
     codes.z += dot(planes, second);
     codes.y += dot(planes, 1.0 - second);"""
         )
+        sample = f"textureLod({name}, ({name}Tile + {{}}) * {_vec2(1 / columns, 1 / rows)}, 0.0)"
+        if side == SIDE:
+            parts.append(f"\n  vec2 {name}Place = {_inside(side, 'placeOut')};")
+            sample = sample.format(f"{name}Place")
+        else:
+            # The decoder takes these planes at the texture's texels; what lies between them is
+            # interpolated.
+            for end, place in (("Low", "vec2(corner)"), ("High", "vec2(corner + 1)")):
+                place = f"(min({place}, {SIDE - 1}.0) + 0.5) / {SIDE}.0"
+                parts.append(f"\n  vec2 {name}{end} = {_inside(side, place)};")
+            low, high = f"{name}Low", f"{name}High"
+            ends = [low, f"vec2({high}.x, {low}.y)", f"vec2({low}.x, {high}.y)", high]
+            one, two, three, four = (sample.format(end) for end in ends)
+            sample = (
+                f"mix(mix({one}, {two}, between.x), mix({three}, {four}, between.x), between.y)"
+            )
         parts.append(f"""
-  vec2 {name}Place = clamp(placeOut, {_MARGIN / side!r}, {1 - _MARGIN / side!r})
-    + tilesOut.{"xy" if name == "detail" else "zw"};
+  vec2 {name}Tile = tilesOut.{"xy" if name == "detail" else "zw"};
   for (int k = 0; k < int(runsOut.{"x" if name == "detail" else "y"}); k++) {{
-    vec4 planes = textureLod({name}, {name}Place * {_vec2(1 / columns, 1 / rows)}, 0.0)
-      * {name}Out[k];
+    vec4 planes = {sample} * {name}Out[k];
     {added}
-    {name}Place.x += 1.0;
-    if ({name}Place.x >= {columns}.0) {name}Place += vec2(-{columns}.0, 1.0);
+    {name}Tile.x += 1.0;
+    if ({name}Tile.x >= {columns}.0) {name}Tile += vec2(-{columns}.0, 1.0);
   }}
 """)
     if page.flags[0, 1]:
@@ -420,6 +434,11 @@ def _fragment(page: Page) -> str:
   diffuseColor = vec3(0.0);
 """)
     return "".join(parts)
+
+
+def _inside(side: int, place: str) -> str:
+    """A place in a tile of ``side`` texels, away from what lies beside it."""
+    return f"clamp({place}, {_MARGIN / side!r}, {1 - _MARGIN / side!r})"
 
 
 def _vec2(x: float, y: float) -> str:

@@ -21,8 +21,8 @@ def depth_error(depth: NDArray[np.floating], truth: NDArray[np.floating]) -> flo
 
 def stray_share(
     positions: NDArray[np.floating],
-    intrinsics: NDArray[np.floating],
-    poses: NDArray[np.floating],
+    intrinsics: NDArray[np.float64],
+    poses: NDArray[np.float64],
     truths: NDArray[np.floating],
 ) -> float:
     """Share of points (n, 3) up to 20 m before a camera that are nearer than the true surface.

@@ -75,7 +75,7 @@ def _mask_of_view(
     far = np.empty(len(states), np.int64)
     for i in range(len(states)):
         # Of two that are as near, the one of the lower direction.
-        far[i] = 2 * abs(int(direction[i]) - int(direction[view])) + (i > view)
+        far[i] = 2 * abs(np.int64(direction[i]) - np.int64(direction[view])) + (i > view)
     order = np.argsort(far)
     for y in range(SIDE):
         for x in range(SIDE):

@@ -85,7 +85,10 @@ STREET_POINTS = Schema(
             "Exposure of each photograph: factor of linear light, about 1",
         ),
         "agreement": Variable(
-            ("taken",), "float64", "1", "Share of each frame's points that its neighbours confirm"
+            ("taken",),
+            "float64",
+            "1",
+            "Share of some frames' points that their neighbours confirm; NaN: not asked",
         ),
     },
 )

@@ -2,7 +2,7 @@
 
 What a view did not see of its texture is filled by the fit of Eq. 1 with gaps, of as many
 components as there are views; a direction that nobody observed is as the nearest one observed.
-Equal rows of a matrix need not be written out: each counts as often as there are directions like it.
+Equal rows of a matrix need not be written out: each counts as often as there are such directions.
 """
 
 from __future__ import annotations
@@ -11,10 +11,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.coded_arrays import CodedArrays, starts
 from pipelines.street_billboards.eigen_kernels import channels_of, code_planes, counted_of
 from pipelines.street_billboards.low_rank_fit import RIDGE, FloatArray, dot, refined, started
 from pipelines.street_billboards.plane_resolution import fill_unknown
-from pipelines.street_billboards.textures import SIDE
+from pipelines.street_billboards.texture_masks import masks_of
+from pipelines.street_billboards.textures import SIDE, ViewTextures
+from pipelines.street_billboards.view_directions import DIRECTIONS
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -95,20 +98,13 @@ def code_paper(
     states: Bytes,
     shares: FloatArray,
     nearest: Ints,
-    ranks: Bytes,
-    first_plane: tuple[Ints, Ints, Ints],
-    first_weight: tuple[Ints, Ints, Ints],
-    means: Bytes,
-    planes: tuple[Bytes, Bytes, Bytes],
-    scales: tuple[FloatArray, FloatArray, FloatArray],
-    weights: tuple[Bytes, Bytes, Bytes],
+    arrays: CodedArrays,
 ) -> None:
-    """Codes of 32 views a billboard into the arrays of CompressedTextures, ranks (b, 3) given.
+    """Codes of 32 views a billboard into ``arrays``, of the ranks that they have.
 
-    nearest (b, 32): rows of observed views. planes are (r, 1024) here; what is not written (planes
-    beyond the rank that exists) must stand for zero.
+    nearest (b, 32): rows of observed views. Planes beyond the rank that exists stay as they are.
     """
-    for b in range(len(ranks)):
+    for b in range(len(nearest)):
         begin, end = first[b], first[b + 1]
         views = end - begin
         counted = counted_of(states[begin:end], np.ones(views, np.float32))
@@ -117,14 +113,14 @@ def code_paper(
         channels = channels_of(colours[begin:end], False)
         everything = np.ones((views, SIDE * SIDE), np.float32)
         for c in range(3):
-            rank = int(ranks[b, c])
+            rank = int(arrays.ranks[b, c])
             filled, middle, amounts, images, squares = _components(
                 channels[c], counted, shares[begin:end]
             )
             kept = 0
             while kept < min(rank, views) and squares[kept] > 0.0:
                 kept += 1
-            plane, weight = first_plane[c][b], first_weight[c][b]
+            plane, weight = arrays.first_plane[c][b], arrays.first_weight[c][b]
             mean_codes = np.empty(views, np.uint8)
             weight_codes = np.empty(views * kept, np.uint8)
             code_planes(
@@ -135,12 +131,53 @@ def code_paper(
                 images[:kept].copy(),
                 SIDE,
                 mean_codes,
-                planes[c][plane : plane + kept],
-                scales[c][plane : plane + kept],
+                arrays.planes[c][plane : plane + kept],
+                arrays.scales[c][plane : plane + kept],
                 weight_codes,
             )
             for d in range(nearest.shape[1]):
                 i = nearest[b, d] - begin
-                means[b * nearest.shape[1] + d, c] = mean_codes[i]
+                arrays.means[b * nearest.shape[1] + d, c] = mean_codes[i]
                 place = weight + d * rank
-                weights[c][place : place + kept] = weight_codes[i * kept : (i + 1) * kept]
+                arrays.weights[c][place : place + kept] = weight_codes[i * kept : (i + 1) * kept]
+
+
+# ---- directions ------------------------------------------------------------------------------
+
+
+def nearest_views(views: ViewTextures) -> NDArray[np.int64]:
+    """(b, 32) rows of the views nearest to each direction, -1 for a billboard without any."""
+    counts = np.diff(views.first)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    apart = np.full((len(counts), DIRECTIONS), 2 * DIRECTIONS)
+    nearest = np.full((len(counts), DIRECTIONS), -1, np.int64)
+    # The n-th view of every billboard that has as many; the first of two that are as near stays.
+    for n in range(int(counts.max(initial=0))):
+        rows = (views.first[:-1] + n)[counts > n]
+        far = np.abs(views.direction[rows, None].astype(np.int64) - np.arange(DIRECTIONS))
+        better = far < apart[owner[rows]]
+        nearest[owner[rows]] = np.where(better, rows[:, None], nearest[owner[rows]])
+        apart[owner[rows]] = np.where(better, far, apart[owner[rows]])
+    return nearest
+
+
+def reaching(squares: NDArray[np.float64], contribution: float) -> NDArray[np.uint8]:
+    """How many of squared singular values (b, 3, 32), falling, add up to a share of all."""
+    total = squares.sum(axis=2, keepdims=True)
+    # A hair less, so that the share 1 does not hang on rounding.
+    short = np.cumsum(squares, axis=2) < contribution * (1.0 - 1e-6) * total
+    return np.where(total[..., 0] > 0.0, short.sum(axis=2) + 1, 0).astype(np.uint8)
+
+
+def masks_of_directions(
+    views: ViewTextures, turns: NDArray[np.bool_], nearest: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Masks of the observed views, for all 32 directions of what turns."""
+    first, masks = masks_of(views, turns)
+    first_mask = starts(np.where(turns, DIRECTIONS, 1))
+    result = np.zeros((first_mask[-1], SIDE, SIDE // 8), np.uint8)
+    result[first_mask[:-1][~turns]] = masks[first[:-1][~turns]]
+    observed = turns & (np.diff(views.first) > 0)
+    rows = nearest[observed] + (first[:-1] - views.first[:-1])[observed, None]
+    result[first_mask[:-1][observed, None] + np.arange(DIRECTIONS)] = masks[rows]
+    return first_mask, result

@@ -1,0 +1,57 @@
+"""How many planes, and of how many texels, each billboard gets for the fewest bytes.
+
+A plane is worth its bytes where it takes off more squared error than they would elsewhere: with one
+exchange rate for all billboards (a Lagrange multiplier) each chooses for itself.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_LEAST, _MOST = -20.0, 40.0
+"""Octaves of the exchange rate, codes² a byte."""
+_BISECTIONS = 50
+
+
+class Choice(NamedTuple):
+    """Of b billboards."""
+
+    form: NDArray[np.int64]
+    """(b,), which of the forms."""
+    ranks: NDArray[np.uint8]
+    """(b, 3), planes of each channel."""
+    squares: float
+    """Sum of squares that this leaves, as foretold."""
+
+
+def chosen(squares: Floats, costs: Floats, allowed: float) -> Choice:
+    """The fewest bytes that leave ``allowed`` at most, or as little as can be.
+
+    squares, costs (forms, b, 3, ranks): sums of squares that ranks leave (infinity where there is
+    no such rank), and their bytes. Every billboard takes one of the forms for all its channels. The
+    exchange rate is found by bisection: the result does not depend on the order of billboards.
+    """
+
+    def at(rate: float) -> Choice:
+        both = squares + rate * costs
+        form = both.min(axis=3).sum(axis=2).argmin(axis=0)
+        each = np.arange(len(form))
+        ranks = both[form, each].argmin(axis=2)
+        left = np.take_along_axis(squares[form, each], ranks[:, :, None], 2).sum()
+        return Choice(form, ranks.astype(np.uint8), float(left))
+
+    low, high = _LEAST, _MOST
+    if at(2.0**low).squares > allowed:
+        return at(0.0)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if at(2.0**middle).squares <= allowed:
+            low = middle
+        else:
+            high = middle
+    return at(2.0**low)

@@ -1,0 +1,154 @@
+"""Figures of pictures and of depth: closed forms and brute force."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipelines.colour import encode_srgb
+from pipelines.street_billboards.cameras import points_at
+from pipelines.street_billboards.figures import evened, likeness, near, psnr, psnr_of, squares
+from pipelines.street_billboards.stereo_figures import depth_error, stray_share
+from tests.pipelines.street_billboards.compressed_street import placed_camera
+
+ALL = np.ones((24, 30), bool)
+
+
+def noise(seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).integers(20, 230, (24, 30, 3), dtype=np.uint8)
+
+
+# ---- pictures --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("off", [1, 7, 20])
+def test_psnr_of_an_even_difference(off: int) -> None:
+    truth = noise()
+    picture = truth + np.uint8(off)
+    assert psnr(picture, truth, ALL) == pytest.approx(20 * math.log10(255 / off))
+    assert psnr(truth, picture, ALL) == pytest.approx(20 * math.log10(255 / off))
+
+
+def test_psnr_asks_only_where_it_is_told() -> None:
+    truth = noise()
+    where = np.random.default_rng(1).random(ALL.shape) < 0.5
+    picture = np.where(where[..., None], truth + np.uint8(10), 0).astype(np.uint8)
+    assert psnr(picture, truth, where) == pytest.approx(20 * math.log10(25.5))
+
+
+def test_squares_may_be_pooled() -> None:
+    truth, picture = noise(1), noise(2)
+    left = ALL.copy()
+    left[:, 11:] = False
+    parts = [squares(picture, truth, left), squares(picture, truth, ~left)]
+    assert psnr_of(np.concatenate(parts)) == pytest.approx(psnr(picture, truth, ALL))
+
+
+def test_equal_pictures_are_alike() -> None:
+    found = likeness(noise(), noise(), ALL)
+    assert found.psnr > 100
+    assert found.ssim == pytest.approx(1.0)
+    assert found.flip == pytest.approx(0.0, abs=1e-6)
+
+
+def test_likeness_sees_only_the_asked_half() -> None:
+    truth = noise()
+    picture = truth.copy()
+    picture[:, :8] = 255 - picture[:, :8]
+    right = ALL.copy()
+    right[:, :23] = False  # FLIP's and SSIM's windows are smaller than the gap
+    spoilt = likeness(picture, truth, ~right)
+    assert likeness(picture, truth, right).ssim == pytest.approx(1.0)
+    assert likeness(picture, truth, right).psnr > 100
+    assert spoilt.ssim < 0.9
+    assert spoilt.flip > 0.05
+
+
+@given(gains=st.tuples(*[st.floats(0.3, 1.0)] * 3), seed=st.integers(0, 100))
+def test_evened_takes_back_a_gain(gains: tuple[float, float, float], seed: int) -> None:
+    light = np.random.default_rng(seed).uniform(0.05, 0.9, (24, 30, 3))
+    truth = np.rint(encode_srgb(light) * 255).astype(np.uint8)
+    picture = np.rint(encode_srgb(light * gains) * 255).astype(np.uint8)
+    found = evened(picture, truth, ALL)
+    # A code of the darker picture stands for up to this many of the brighter one.
+    most = max(gain ** (-1 / 2.4) for gain in gains) / 2 + 1.5
+    assert np.abs(found.astype(int) - truth).max() <= most
+    np.testing.assert_array_equal(evened(truth, truth, ALL), truth)
+
+
+def test_evened_is_not_misled_by_what_is_not_asked() -> None:
+    truth = noise()
+    picture = truth.copy()
+    where = ALL.copy()
+    where[:5] = False
+    picture[:5] = 0
+    np.testing.assert_array_equal(evened(picture, truth, where)[5:], truth[5:])
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 1000), share=st.floats(0.0, 0.1), pixels=st.integers(0, 8))
+def test_near_by_brute_force(seed: int, share: float, pixels: int) -> None:
+    mask = np.random.default_rng(seed).random((15, 18)) < share
+    y, x = np.mgrid[:15, :18]
+    expected = np.zeros_like(mask)
+    for row, column in np.argwhere(mask):
+        expected |= (y - row) ** 2 + (x - column) ** 2 <= pixels**2
+    np.testing.assert_array_equal(near(mask, pixels), expected)
+
+
+# ---- depth -----------------------------------------------------------------------------------
+
+
+def test_depth_error_by_hand() -> None:
+    truth = np.array([[10.0, 10.0, 10.0, 10.0], [19.0, 21.0, np.inf, np.nan]])
+    depth = np.array([[10.4, 9.6, 10.6, np.nan], [19.0, 9.0, 3.0, 3.0]])
+    # Two of five up to 20 m are wrong: one by 6 %, one unknown.
+    assert depth_error(depth, truth) == pytest.approx(2 / 5)
+    assert depth_error(truth, truth) == 0.0
+
+
+@given(share=st.floats(0.0, 1.0), seed=st.integers(0, 100))
+def test_depth_error_is_the_share_that_was_spoilt(share: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(2, 40, (30, 30))
+    spoilt = rng.random(truth.shape) < share
+    depth = truth * np.where(spoilt, rng.choice([0.9, 1.1, np.nan], truth.shape), 1.02)
+    expected = spoilt[truth < 20].mean()
+    assert depth_error(depth, truth) == pytest.approx(expected)
+
+
+def test_stray_points_are_those_before_the_surface() -> None:
+    size = (30, 20)
+    lenses, poses = zip(
+        *(placed_camera((x, -8.0, 0), (x, 0, 0), size, 25.0) for x in (0.0, 1.0)), strict=True
+    )
+    truths = np.full((2, 20, 30), 8.0)
+    rng = np.random.default_rng(0)
+
+    def on_wall(count: int, y: float) -> np.ndarray:
+        return np.column_stack(
+            [rng.uniform(0, 1, count), np.full(count, y), rng.uniform(-1, 1, count)]
+        )
+
+    right, floating, hidden = on_wall(60, 0.1), on_wall(20, -1.0), on_wall(33, 2.0)
+    behind = on_wall(11, -30.0)
+    points = np.concatenate([right, floating, hidden, behind])
+    found = stray_share(points, lenses[0], np.stack(poses), truths)
+    assert found == pytest.approx(20 / 80)
+    assert stray_share(behind, lenses[0], np.stack(poses), truths) == 0.0
+
+
+def test_true_depth_maps_have_no_strays() -> None:
+    lens, pose = placed_camera((1.0, -8.0, 2.0), (0, 0, 0), (30, 20), 25.0)
+    depth = np.random.default_rng(1).uniform(2, 19, (20, 30))
+    points = points_at(lens, pose, depth).reshape(-1, 3)
+    assert stray_share(points, lens, pose[None], depth[None]) == 0.0
+    y, x = np.mgrid[:20, :30]
+    forward = np.where(((x + y) % 3 == 0)[..., None], 0.9, 1.0).reshape(-1, 1)
+    pulled = pose[:3, 3] + forward * (points - pose[:3, 3])
+    strays = stray_share(pulled, lens, pose[None], depth[None])
+    assert strays == pytest.approx(((x + y) % 3 == 0).mean())
