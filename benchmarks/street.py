@@ -38,6 +38,7 @@ from pipelines.street_billboards import eigen_textures as coding
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
 from pipelines.street_billboards.stage_view import CpuStreet, Street, stage_camera
+from pipelines.street_billboards.depth_refinement import filled
 from pipelines.street_billboards.stereo import bad_share, disparity_defaults, match
 from pipelines.street_billboards.textures import SEEN, ViewTextures
 from storage.readers.street_photographs import motorcycle
@@ -320,7 +321,9 @@ def _stereo(_: Stored, __: dict[str, Any]) -> dict[str, Any]:
     pair = motorcycle()
     found, _other = match(pair.left, pair.right, pair.most)
     plain = disparity_defaults(pair.left, pair.right, pair.most)
+    dense = filled(found.disparity, pair.left)
     return {
-        "stereo_bad05_percent": 100 * bad_share(found.disparity, pair.disparity),
+        "stereo_bad05_percent": 100 * bad_share(dense, pair.disparity),
+        "stereo_bad05_percent_with_holes": 100 * bad_share(found.disparity, pair.disparity),
         "stereo_bad05_percent_opencv": 100 * bad_share(plain, pair.disparity),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,16 @@ from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
 from assets_defs.ssdf_lighting import SSDF
+from assets_defs.street_billboards import STREET
+from assets_defs.street_billboards.datasets import billboards_of, pages_of, views_of
+from assets_defs.street_billboards.textures import TextureSettings, view_textures
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
+from pipelines.colour import to_8bit
 from pipelines.ssdf_lighting.pictures import curve_picture
+from pipelines.street_billboards import eigen_textures, figures
+from pipelines.street_billboards.atlases import pages
+from pipelines.street_billboards.frames import StreetStage
 from storage.versions import VersionedStore
 
 FOLDER = Path(__file__).parent / "pictures"
@@ -48,6 +56,7 @@ def make_pictures(store: VersionedStore) -> None:
     _moving("btf-wall.webp", _wall(store))
     _scratches(store)
     _lighting(store)
+    _street(store)
 
 
 def _lighting(store: VersionedStore) -> None:
@@ -80,6 +89,52 @@ def _lighting(store: VersionedStore) -> None:
         )
     result = json.loads((Path("benchmarks") / "results" / "ssdf.json").read_text())
     Image.fromarray(curve_picture(result["curve"])).save(FOLDER / "ssdf-curve.png", optimize=True)
+
+
+def _street(store: VersionedStore) -> None:
+    keys = {"drive": "city"}
+    assert STREET.overview is not None
+    overview = STREET.overview(store, list(store.slots()))
+    _moving("street-flight.webp", overview["city-flight"][:, ::2, ::2])
+    for name, asset, picture in (
+        ("street-held-out.jpg", "street_frames", "held-out"),
+        ("street-beside.jpg", "street_frames", "beside-the-path"),
+        ("street-depth.jpg", "depth_maps", "depth"),
+        ("street-views.png", "view_textures", "views"),
+        ("street-plan.png", "billboards", "plan"),
+    ):
+        shown = Image.fromarray(_shown(store, STREET, asset, keys, picture))
+        shown.thumbnail((1600, 1600))
+        shown.save(FOLDER / name, quality=85, optimize=True)
+    _row("street-pole.jpg", *_pole(store))
+
+
+def _pole(store: VersionedStore) -> list[NDArray[np.uint8]]:
+    """Around the widest pole of a held-out frame: photograph, with occlusion, sampled plainly."""
+
+    def stored(asset: str) -> Any:
+        return store.open(STREET.slot(asset, {"drive": "city"}))
+
+    drive, made = stored("drive_frames"), billboards_of(stored("billboards"))
+    frame = int(drive["truth_pole"].values.sum(axis=(1, 2)).argmax())
+    pole = drive["truth_pole"].values[frame]
+    middle = int(pole.sum(axis=0).argmax())
+    pose = drive["poses"].values[drive["held_out"].values, 1][frame]
+    size = (drive.sizes["x"], drive.sizes["y"])
+    inputs = [stored(name) for name in ("drive_frames", "depth_maps", "street_points")]
+    plain, _ = view_textures(
+        TextureSettings(sampling="plain"), lambda fraction: None, *inputs, stored("billboards")
+    )
+    textures = eigen_textures.compressed(views_of(plain), made.turns, error=4.0)
+    truth = stored("street_frames")["truth"].values[frame]
+    pictures = [truth]
+    for packed in (pages_of(stored("texture_atlases")), pages(textures)):
+        sky = stored("depth_maps")["sky"].values
+        with StreetStage(made, packed, sky, size, supersampling=2) as stage:
+            view = stage.view(drive["intrinsics"].values[1], pose)
+        pictures.append(figures.evened(to_8bit(view.with_sky), truth, view.covered > 0.5))
+    left = min(max(middle - size[0] // 5, 0), size[0] - 2 * size[0] // 5)
+    return [picture[:, left : left + 2 * size[0] // 5] for picture in pictures]
 
 
 def _scratches(store: VersionedStore) -> None:

@@ -26,7 +26,7 @@ class Likeness(NamedTuple):
 def evened(picture: Picture, truth: Picture, where: NDArray[np.bool_]) -> Picture:
     """The picture (y, x, 3) at the exposure of the true one: one factor of linear light a channel.
 
-    The factor is the ratio of the medians' neighbourhood: of sums over ``where`` (y, x).
+    The factor is the ratio of the sums over ``where`` (y, x).
     """
     mine, theirs = decode_srgb(picture[where] / 255.0), decode_srgb(truth[where] / 255.0)
     factor = theirs.sum(axis=0) / np.maximum(mine.sum(axis=0), 1e-9)

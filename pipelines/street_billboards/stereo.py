@@ -340,19 +340,21 @@ def _turned_back(
     pixels = ((turned / turned[..., 2:]) @ lens.T).astype(np.float32)
     # Disparities are not mixed: between two surfaces there is none.
     disparity, confidence = (
-        cv2.remap(
-            np.nan_to_num(one),
-            pixels[..., 0],
-            pixels[..., 1],
-            cv2.INTER_NEAREST,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=0,
+        np.asarray(
+            cv2.remap(
+                np.nan_to_num(one),
+                pixels[..., 0],
+                pixels[..., 1],
+                cv2.INTER_NEAREST,
+                borderMode=cv2.BORDER_CONSTANT,
+                borderValue=0,
+            ),
+            np.float32,
         )
         for one in found
     )
-    disparity = np.where(confidence > 0, disparity, np.nan).astype(np.float32)
-    over = turned[..., 2].astype(np.float32)
-    return DisparityMap(disparity, confidence.astype(np.float32)), over
+    disparity = np.where(confidence > 0, disparity, np.float32(np.nan))
+    return DisparityMap(disparity, confidence), turned[..., 2].astype(np.float32)
 
 
 def _merged(first: _Inverse, second: _Inverse) -> _Inverse:

@@ -23,6 +23,7 @@ from assets_defs.launcher import Request
 from assets_defs.neural_btf import BTF
 from assets_defs.photo_fur import FUR
 from assets_defs.ssdf_lighting import SSDF
+from assets_defs.street_billboards import STREET
 from assets_defs.system import Source, System, partition_key
 from storage.schemas import schemas_of
 from storage.versions import Slot
@@ -99,6 +100,22 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
             "triangle_clusters",
             "ssdf_basis",
             "environment_lights",
+        },
+    }
+    assert _parents(house, STREET) == {
+        "drive_frames": set(),
+        "depth_maps": {"drive_frames"},
+        "street_points": {"drive_frames", "depth_maps"},
+        "billboards": {"drive_frames", "street_points"},
+        "view_textures": {"drive_frames", "depth_maps", "street_points", "billboards"},
+        "eigen_textures": {"billboards", "view_textures"},
+        "texture_atlases": {"drive_frames", "billboards", "eigen_textures"},
+        "street_frames": {
+            "drive_frames",
+            "depth_maps",
+            "billboards",
+            "eigen_textures",
+            "texture_atlases",
         },
     }
     for system in SYSTEMS.values():

@@ -7,6 +7,7 @@ scikit-image. The car drives along +y, 2 m above the road.
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +61,7 @@ def _street() -> tuple[RaycastingScene, NDArray[np.int64]]:
     turns = np.linspace(0, 2 * np.pi, 13)
     ring = POLE_RADIUS * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     for x, y in POLES:
-        for (a, b), (c, d) in zip(ring[:-1], ring[1:], strict=True):
+        for (a, b), (c, d) in itertools.pairwise(ring):
             quad((x + a, y + b, 0), (x + c, y + d, 0), (x + c, y + d, 5), (x + a, y + b, 5), _POLE)
     vertices = np.concatenate(corners)
     scene = build_scene(vertices, np.arange(len(vertices)).reshape(-1, 3))
