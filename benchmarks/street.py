@@ -37,8 +37,8 @@ from pipelines.stage import Stage
 from pipelines.street_billboards import eigen_textures as coding
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
-from pipelines.street_billboards.stage_view import CpuStreet, Street, stage_camera
 from pipelines.street_billboards.depth_refinement import filled
+from pipelines.street_billboards.stage_view import CpuStreet, Street, stage_camera
 from pipelines.street_billboards.stereo import bad_share, disparity_defaults, match
 from pipelines.street_billboards.textures import SEEN, ViewTextures
 from storage.readers.street_photographs import motorcycle

@@ -5,8 +5,12 @@ BC1 by quicktex, BC7 by etcpak, both at their best; decoded by imagecodecs.
 
 from __future__ import annotations
 
+import etcpak
+import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
+from quicktex import RawTexture  # type: ignore[attr-defined]
+from quicktex.s3tc.bc1 import BC1Encoder  # type: ignore[attr-defined]
 
 _STACK = 256
 """Views a call: one picture of 32 x 32 n texels."""
@@ -20,8 +24,6 @@ def blocks_coded(
     name: "bc1" or "bc7". What was not seen takes the view's mean colour: it costs a block nothing
     and is not counted; alpha is kept apart, as it is for eigen-textures.
     """
-    import imagecodecs
-
     weight = seen.sum(axis=(1, 2), keepdims=True)[..., None]
     mean = (colours * seen[..., None]).sum(axis=(1, 2), keepdims=True) / np.maximum(weight, 1)
     filled = np.where(seen[..., None], colours, np.rint(mean)).astype(np.uint8)
@@ -42,14 +44,9 @@ def _packed(name: str, picture: NDArray[np.uint8]) -> bytes:
     """Blocks of an opaque picture (y, x, 4), at the encoders' best."""
     height, width, _ = picture.shape
     if name == "bc1":
-        from quicktex import RawTexture
-        from quicktex.s3tc.bc1 import BC1Encoder
-
         encoder = BC1Encoder(level=18, color_mode=BC1Encoder.ColorMode.FourColor)
         texture = RawTexture.frombytes(picture.tobytes(), width, height)
         return bytes(encoder.encode(texture).tobytes())
-    import etcpak
-
     asked = etcpak.BC7CompressBlockParams()
     asked.init_linear_weights()
     asked.m_uber_level, asked.m_max_partitions = 4, 64

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+    from pipelines.street_billboards.cameras import Cameras
     from pipelines.street_billboards.view_textures import Photographs
 
     Pictures = dict[str, NDArray[np.uint8]]
@@ -259,18 +260,14 @@ def view_textures(
     from pipelines.street_billboards.textures import joined
 
     made, tiles = billboards_of(billboards), billboards["tile"].values
-    places = viewers(drive_frames)
+    places, cameras = viewers(drive_frames), taken_cameras(drive_frames)
     parts = []
     for number in np.unique(tiles):
         progress(0.9 * number / (tiles[-1] + 1))
         own = tiles == number
         some = Billboards(*(values[own] for values in made))
-        away = np.linalg.norm(
-            places - some.voxel[np.linalg.norm(places[:, None] - some.voxel, axis=2).argmin(1)],
-            axis=1,
-        )
-        near = np.flatnonzero(away < settings.farthest_view)
-        frames = slice(int(near.min()), int(near.max()) + 1)
+        near = _frames_that_see(cameras, len(places), some.voxel, settings.farthest_view)
+        frames = slice(int(near[0]), int(near[-1]) + 1) if len(near) else slice(0, 1)
         photographs = _photographs(
             drive_frames, depth_maps, street_points, frames, settings.farthest_view
         )
@@ -300,6 +297,22 @@ def view_textures(
     }
 
 
+def _frames_that_see(
+    cameras: Cameras, frames: int, voxels: NDArray[np.float64], farthest: float
+) -> NDArray[np.int64]:
+    """Frames of which some camera has some voxel before it, not too far away."""
+    import numpy as np
+
+    from pipelines.street_billboards.cameras import projected
+
+    seen = np.zeros(len(cameras.to_world), bool)
+    for number, pose in enumerate(cameras.to_world):
+        depth = projected(cameras.intrinsics[number], pose, voxels)[1]
+        away = np.linalg.norm(voxels - pose[:3, 3], axis=1)
+        seen[number] = bool(((depth > 0) & (away < farthest)).any())
+    return np.flatnonzero(seen.reshape(frames, -1).any(axis=1))
+
+
 def _photographs(
     drive: xr.Dataset, depths: xr.Dataset, points: xr.Dataset, frames: slice, farthest: float
 ) -> Photographs:
@@ -316,7 +329,7 @@ def _photographs(
     near = (positions > places.min(axis=0) - reach) & (positions < places.max(axis=0) + reach)
     positions = positions[near.all(axis=1)]
     _, height, width = views.depth.shape
-    depth, deviation = views.depth.copy(), views.deviation.copy()
+    depth, deviation = views.depth, views.deviation
     for number in range(len(depth)):
         unknown = np.isnan(depth[number])
         surface = surface_depth(

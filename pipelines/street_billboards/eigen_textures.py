@@ -45,7 +45,8 @@ _CURVE_SWEEPS, _SWEEPS = 4, 10
 _NEGLIGIBLE = 0.02
 """Of the squared error asked for: what is left below that ends a billboard's curve."""
 _PASSES = 4
-_NEAR = 0.99
+_AIM, _NEAR = 0.995, 0.99
+"""Of the squared error asked for: what is aimed at, and what is near enough."""
 
 
 class Part(NamedTuple):
@@ -145,19 +146,19 @@ def _searched(
         return parts, total
 
     allowed = error**2 * 3.0 * float((views.states == SEEN).sum())
-    aim, found = allowed, None
+    aim, least = _AIM * allowed, np.inf
+    found: list[Part] = []
     for _ in range(_PASSES):
         choice = chosen(squares, costs, aim)
         parts, total = coded(choice)
-        if total <= allowed or found is None:
-            found = parts
+        if total <= max(allowed, least):
+            found, least = parts, total
         if _NEAR * allowed <= total <= allowed:
             break
         # Rounding to 8 bit adds a little to what the curves foretell: aim lower by as much.
-        aim = allowed - (total - choice.squares)
+        aim = _AIM * allowed - (total - choice.squares)
         if aim <= 0.0:
             break
-    assert found is not None
     return found
 
 
