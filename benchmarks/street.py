@@ -143,7 +143,7 @@ def _paper_form(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
     paper = coding.compressed_paper(views, turns, rank=16)
     parts = coding.byte_counts(paper)
     count = len(turns)
-    ours = coding.compressed(views, turns, error=4.0)
+    ours = coding.compressed(views, turns, error=4.4)
     return {
         "bytes_r16": (parts["eigen"] + parts["weights"] + parts["means"]) / count,
         "bytes_r16_side": parts["scales"] / count,
@@ -163,7 +163,7 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
         apart = pictures[seen].astype(np.float64) - views.colours[seen]
         rivals[name] = (figures.psnr_of(apart**2), size)
     curve = []
-    for error in (3.0, 4.0, 5.0):
+    for error in (3.0, 4.4, 5.0):
         ours = coding.compressed(views, turns, error=error)
         parts = coding.byte_counts(ours)
         psnr = coding.decode_error(views, ours)[1]

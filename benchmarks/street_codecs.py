@@ -35,7 +35,7 @@ def blocks_coded(
         picture[..., :3] = views.reshape(*shape[:2], 3)
         packed = _packed(name, picture)
         size += len(packed)
-        decoded = imagecodecs.bcn_decode(packed, int(name[-1]), shape=shape)
+        decoded = np.asarray(imagecodecs.bcn_decode(packed, int(name[-1]), shape=shape))
         made[first : first + _STACK] = decoded[..., :3].reshape(views.shape)
     return made, size
 

@@ -125,7 +125,7 @@ def _pole(store: VersionedStore) -> list[NDArray[np.uint8]]:
     plain, _ = view_textures(
         TextureSettings(sampling="plain"), lambda fraction: None, *inputs, stored("billboards")
     )
-    textures = eigen_textures.compressed(views_of(plain), made.turns, error=4.0)
+    textures = eigen_textures.compressed(views_of(plain), made.turns, error=4.4)
     truth = stored("street_frames")["truth"].values[frame]
     pictures = [truth]
     for packed in (pages_of(stored("texture_atlases")), pages(textures)):

@@ -72,7 +72,7 @@ class EigenSettings(Settings):
         "chroma; or, as in the paper, equally many of R, G and B for 32 views",
     )
     error: float = Field(
-        4.0, gt=0, le=100, description="Compact: RMSE in codes over all texels that were seen"
+        4.4, gt=0, le=100, description="Compact: RMSE in codes over all texels that were seen"
     )
     rank: int = Field(16, ge=1, le=31, description="Paper: eigen-images, r")
     contribution: float | None = Field(

@@ -10,15 +10,15 @@ for bytes holds for all of them (a Lagrange multiplier), searched until the erro
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.coded_arrays import CodedArrays, as_textures, blank, starts
+from pipelines.street_billboards.coded_arrays import CodedArrays, as_textures, blank
 from pipelines.street_billboards.decoding import decodable, seen_errors
 from pipelines.street_billboards.eigen_kernels import (
     LUMA_CHROMA_WEIGHTS,
@@ -34,7 +34,7 @@ from pipelines.street_billboards.paper_form import (
     paper_squares,
     reaching,
 )
-from pipelines.street_billboards.rank_choice import Choice, chosen
+from pipelines.street_billboards.rank_choice import chosen
 from pipelines.street_billboards.texture_masks import masks_of
 from pipelines.street_billboards.textures import SEEN, SIDE, CompressedTextures, ViewTextures
 from pipelines.street_billboards.view_directions import DIRECTIONS
@@ -47,15 +47,6 @@ _NEGLIGIBLE = 0.02
 _PASSES = 4
 _AIM, _NEAR = 0.995, 0.99
 """Of the squared error asked for: what is aimed at, and what is near enough."""
-
-
-class Part(NamedTuple):
-    """Billboards whose planes have the same sides."""
-
-    billboards: NDArray[np.int64]
-    """(k,), rows of the views' table, rising."""
-    textures: CompressedTextures
-    """Of these k."""
 
 
 def compressed(
@@ -77,82 +68,33 @@ def compressed(
 
     Raises ValueError where an option is none of these.
     """
-    forms = ((SIDE, chroma_side),) if colour == "ycocg" else ((SIDE, SIDE),)
-    made = _searched(views, turns, error, colour, forms, most_ranks, view_weights)
-    return made[0].textures
-
-
-def compressed_by_resolution(
-    views: ViewTextures,
-    turns: NDArray[np.bool_],
-    *,
-    error: float,
-    forms: Sequence[tuple[int, int]] = ((32, 16), (16, 8)),
-    most_ranks: tuple[int, int, int] = (8, 4, 4),
-    view_weights: NDArray[np.floating] | None = None,
-) -> list[Part]:
-    """Like `compressed` in Y, Co, Cg, each billboard in that of the resolutions that pays.
-
-    forms: sides of luma and chroma, 4, 8, 16 or 32 texels each. What was photographed from afar is
-    blurry: half the side is a quarter of the bytes, and more planes can be had for them. A part for
-    each form, in their order; one without billboards is empty.
-    """
-    return _searched(views, turns, error, "ycocg", forms, most_ranks, view_weights)
-
-
-def _searched(
-    views: ViewTextures,
-    turns: NDArray[np.bool_],
-    error: float,
-    colour: str,
-    forms: Sequence[tuple[int, int]],
-    most_ranks: tuple[int, int, int],
-    view_weights: NDArray[np.floating] | None,
-) -> list[Part]:
-    _check(views, turns, error, colour, forms)
     luma_chroma = colour == "ycocg"
+    sides = np.array([SIDE, *[chroma_side if luma_chroma else SIDE] * 2])
+    _check(views, turns, error, colour, sides)
     importance = LUMA_CHROMA_WEIGHTS if luma_chroma else np.ones(3)
     weights = np.ones(len(views.direction)) if view_weights is None else view_weights
-    weights = np.asarray(weights, np.float32)
-    all_squares, all_costs = [], []
-    for luma, chroma in forms:
-        sides = np.array([luma, chroma, chroma])
-        data = _sampled(views, weights, luma_chroma, sides)
-        squares = _rank_errors(data, np.array(most_ranks), _NEGLIGIBLE * error**2)
-        plane_bytes = np.diff(data.first)[:, None] + sides**2 + _SCALE_BYTES
-        all_squares.append(squares * importance[:, None])
-        all_costs.append(plane_bytes[:, :, None] * np.arange(squares.shape[2]))
-    squares, costs = np.stack(all_squares), np.stack(all_costs)
-
-    def coded(choice: Choice) -> tuple[list[Part], float]:
-        parts, total = [], 0.0
-        for form, (luma, chroma) in enumerate(forms):
-            rows = np.flatnonzero(choice.form == form)
-            own, view_rows = _taken(views, rows)
-            sides = np.array([luma, chroma, chroma])
-            data = _sampled(own, weights[view_rows], luma_chroma, sides)
-            first_mask, masks = masks_of(own, turns[rows])
-            textures = as_textures(
-                _coded(data, choice.ranks[rows]),
-                colour=colour,
-                first=data.first,
-                direction=own.direction,
-                sides=sides,
-                first_mask=first_mask,
-                masks=masks,
-            )
-            parts.append(Part(rows, textures))
-            total += float(_squared_errors(own, textures).sum())
-        return parts, total
-
+    data = _sampled(views, np.asarray(weights, np.float32), luma_chroma, sides)
+    squares = _rank_errors(data, np.array(most_ranks), _NEGLIGIBLE * error**2)
+    squares *= importance[:, None]
+    plane_bytes = np.diff(data.first)[:, None] + sides**2 + _SCALE_BYTES
+    costs = plane_bytes[:, :, None] * np.arange(squares.shape[2])
+    first_mask, masks = masks_of(views, turns)
     allowed = error**2 * 3.0 * float((views.states == SEEN).sum())
     aim, least = _AIM * allowed, np.inf
-    found: list[Part] = []
     for _ in range(_PASSES):
         choice = chosen(squares, costs, aim)
-        parts, total = coded(choice)
+        made = as_textures(
+            _coded(data, choice.ranks),
+            colour=colour,
+            first=data.first,
+            direction=views.direction,
+            sides=sides,
+            first_mask=first_mask,
+            masks=masks,
+        )
+        total = float(_squared_errors(views, made).sum())
         if total <= max(allowed, least):
-            found, least = parts, total
+            found, least = made, total
         if _NEAR * allowed <= total <= allowed:
             break
         # Rounding to 8 bit adds a little to what the curves foretell: aim lower by as much.
@@ -172,20 +114,6 @@ def _sampled(
     return Sampled(first, views.colours, views.states, weights, luma_chroma, sides)
 
 
-def _taken(
-    views: ViewTextures, billboards: NDArray[np.int64]
-) -> tuple[ViewTextures, NDArray[np.int64]]:
-    """The views of some billboards, and their rows."""
-    counts = np.diff(views.first)
-    if len(billboards) == len(counts):
-        return views, np.arange(len(views.direction))
-    first = starts(counts[billboards])
-    rows = np.repeat(views.first[billboards] - first[:-1], counts[billboards]) + np.arange(
-        first[-1]
-    )
-    return ViewTextures(first, *(array[rows] for array in views[1:])), rows
-
-
 def compressed_paper(
     views: ViewTextures,
     turns: NDArray[np.bool_],
@@ -201,7 +129,7 @@ def compressed_paper(
 
     Raises ValueError where neither is given, or out of range.
     """
-    _check(views, turns, 1.0, "rgb", ())
+    _check(views, turns, 1.0, "rgb", np.array([SIDE] * 3))
     if rank is None and contribution is None:
         raise ValueError("rank and contribution are None; expected one of them.")
     if rank is not None and not 0 <= rank <= DIRECTIONS:
@@ -271,15 +199,14 @@ def _check(
     turns: NDArray[np.bool_],
     error: float,
     colour: str,
-    forms: Sequence[tuple[int, int]],
+    sides: NDArray[np.int64],
 ) -> None:
     if len(turns) != len(views.first) - 1:
         raise ValueError(f"turns has {len(turns)} entries; expected {len(views.first) - 1}.")
     if colour not in ("ycocg", "rgb"):
         raise ValueError(f'colour is "{colour}"; expected "ycocg" or "rgb".')
-    for luma, chroma in forms:
-        if luma not in _SIDES or chroma not in _SIDES:
-            raise ValueError(f"sides are {luma} and {chroma}; expected 4, 8, 16 or 32 texels.")
+    if not set(sides) <= set(_SIDES):
+        raise ValueError(f"chroma_side is {sides[-1]}; expected 4, 8, 16 or 32 texels.")
     if not error > 0.0:
         raise ValueError(f"error is {error}; expected more than 0 codes.")
 

@@ -1,4 +1,4 @@
-"""How many planes, and of how many texels, each billboard gets for the fewest bytes.
+"""How many planes each billboard gets for the fewest bytes.
 
 A plane is worth its bytes where it takes off more squared error than they would elsewhere: with one
 exchange rate for all billboards (a Lagrange multiplier) each chooses for itself.
@@ -21,8 +21,6 @@ _BISECTIONS = 50
 class Choice(NamedTuple):
     """Of b billboards."""
 
-    form: NDArray[np.int64]
-    """(b,), which of the forms."""
     ranks: NDArray[np.uint8]
     """(b, 3), planes of each channel."""
     squares: float
@@ -32,18 +30,15 @@ class Choice(NamedTuple):
 def chosen(squares: Floats, costs: Floats, allowed: float) -> Choice:
     """The fewest bytes that leave ``allowed`` at most, or as little as can be.
 
-    squares, costs (forms, b, 3, ranks): sums of squares that ranks leave (infinity where there is
-    no such rank), and their bytes. Every billboard takes one of the forms for all its channels. The
-    exchange rate is found by bisection: the result does not depend on the order of billboards.
+    squares, costs (b, 3, ranks): sums of squares that ranks leave (infinity where there is no such
+    rank), and their bytes. The exchange rate is found by bisection: the result does not depend on
+    the order of billboards.
     """
 
     def at(rate: float) -> Choice:
-        both = squares + rate * costs
-        form = both.min(axis=3).sum(axis=2).argmin(axis=0)
-        each = np.arange(len(form))
-        ranks = both[form, each].argmin(axis=2)
-        left = np.take_along_axis(squares[form, each], ranks[:, :, None], 2).sum()
-        return Choice(form, ranks.astype(np.uint8), float(left))
+        ranks = (squares + rate * costs).argmin(axis=2)
+        left = np.take_along_axis(squares, ranks[:, :, None], 2).sum()
+        return Choice(ranks.astype(np.uint8), float(left))
 
     low, high = _LEAST, _MOST
     if at(2.0**low).squares > allowed:
