@@ -21,6 +21,7 @@ import dagster as dg
 
 from assets_defs.checks import Check, build_check
 from assets_defs.code_version import code_version
+from assets_defs.memory import give_back_freed_memory
 from assets_defs.pictures import thumbnail
 from assets_defs.settings import Settings, config_class, resolve
 from assets_defs.workspace import Workspace
@@ -358,6 +359,7 @@ class System:
             what = f"{plan.name} [{', '.join(keys.values())}]"
             progress = functools.partial(context.resources.progress, what)
             progress(0.0)
+            give_back_freed_memory()
             records = {name: data.attrs[RECORD] for name, data in inputs.items()}
             fingerprint = source.fingerprint if source else None
             made_of = provenance(plan, settings, fingerprint, records)

@@ -61,7 +61,7 @@ def viewers(drive: xr.Dataset) -> NDArray[np.float64]:
 
 
 def billboards_of(dataset: xr.Dataset) -> Billboards:
-    """A `billboards` dataset's billboards."""
+    """The billboards of a `billboards` dataset, or of some of its rows."""
     from pipelines.street_billboards.billboards import Billboards
 
     return Billboards(*(dataset[name].values for name in Billboards._fields))

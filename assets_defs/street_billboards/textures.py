@@ -185,19 +185,26 @@ def _seen_share(checked: Checked) -> float:
 
 
 def _sampling_error(checked: Checked) -> float:
-    """Sampled anew with plain NumPy from all photographs of the direction: none is as near."""
+    """Sampled anew with plain NumPy from all photographs: some must show what is stored."""
+    import numpy as np
+
     from pipelines.street_billboards.texture_figures import sampling_error
+    from pipelines.street_billboards.textures import ViewTextures
 
     drive, depths = checked.input("drive_frames"), checked.input("depth_maps")
-    stored = checked.input("billboards")
+    stored, dataset = checked.input("billboards"), checked.dataset
     tile = int(stored["tile"].values[len(stored["tile"]) // 2])
-    frames = slice(max((tile - 5) * TILE_FRAMES, 0), (tile + 2) * TILE_FRAMES)
+    # Of one tile only: neither all textures nor all photographs are loaded.
+    own = np.flatnonzero(stored["tile"].values == tile)
+    ends = dataset["first"].values[own[0] : own[-1] + 2]
+    some = dataset.isel(view=slice(int(ends[0]), int(ends[-1])))
+    views = ViewTextures(ends - ends[0], *(some[name].values for name in ViewTextures._fields[1:]))
+    frames = slice(max((tile - 2) * TILE_FRAMES, 0), (tile + 1) * TILE_FRAMES + 2)
     return sampling_error(
-        billboards_of(stored),
-        views_of(checked.dataset),
+        billboards_of(stored.isel(billboard=own)),
+        views,
         frame_views(drive, depths, frames),
         _codes(checked.input("street_points"), frames),
-        stored["tile"].values == tile,
     )
 
 
@@ -256,16 +263,15 @@ def view_textures(
     import xarray as xr
 
     from pipelines.street_billboards import view_textures as sampling
-    from pipelines.street_billboards.billboards import Billboards
     from pipelines.street_billboards.textures import joined
 
-    made, tiles = billboards_of(billboards), billboards["tile"].values
+    tiles = billboards["tile"].values
     places, cameras = viewers(drive_frames), taken_cameras(drive_frames)
     parts = []
     for number in np.unique(tiles):
         progress(0.9 * number / (tiles[-1] + 1))
-        own = tiles == number
-        some = Billboards(*(values[own] for values in made))
+        own = np.flatnonzero(tiles == number)
+        some = billboards_of(billboards.isel(billboard=own))
         near = _frames_that_see(cameras, len(places), some.voxel, settings.farthest_view)
         frames = slice(int(near[0]), int(near[-1]) + 1) if len(near) else slice(0, 1)
         photographs = _photographs(
@@ -317,6 +323,9 @@ def _photographs(
     drive: xr.Dataset, depths: xr.Dataset, points: xr.Dataset, frames: slice, farthest: float
 ) -> Photographs:
     """The photographs of some frames; where a depth is not known, the one of the points."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    import numba
     import numpy as np
 
     from pipelines.street_billboards.surface_depth import surface_depth
@@ -330,7 +339,8 @@ def _photographs(
     positions = positions[near.all(axis=1)]
     _, height, width = views.depth.shape
     depth, deviation = views.depth, views.deviation
-    for number in range(len(depth)):
+
+    def fill(number: int) -> None:
         unknown = np.isnan(depth[number])
         surface = surface_depth(
             positions,
@@ -343,6 +353,9 @@ def _photographs(
         )
         depth[number][unknown] = surface[unknown]
         deviation[number][unknown] = 0.1
+
+    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
+        list(threads.map(fill, range(len(depth))))
     return Photographs(
         views.photographs, depth, deviation, views.intrinsics, views.poses, _codes(points, frames)
     )

@@ -25,15 +25,14 @@ def sampling_error(
     views: ViewTextures,
     photographs: FrameViews,
     codes: NDArray[np.uint8],
-    asked: NDArray[np.bool_],
 ) -> float:
     """Median codes by which SEEN texels differ from the most alike photograph there.
 
-    codes (k, 256, 3) even out exposures; asked (b,): of which billboards some are taken. Pixels are
-    the nearest ones, without blending and averaging: a code or two of difference is usual, a
-    texture that is mirrored, shifted or of another billboard differs by tens.
+    codes (k, 256, 3) even out exposures. Pixels are the nearest ones, without blending and
+    averaging: a code or two of difference is usual, a texture that is mirrored, shifted or of
+    another billboard differs by tens.
     """
-    numbers = np.flatnonzero(asked & (np.diff(views.first) > 0))
+    numbers = np.flatnonzero(np.diff(views.first) > 0)
     numbers = numbers[:: max(len(numbers) // _BILLBOARDS, 1)]
     steps = (2 * np.arange(SIDE) + 1) / SIDE - 1
     t, s = np.meshgrid(-steps, steps, indexing="ij")

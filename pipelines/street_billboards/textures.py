@@ -7,7 +7,6 @@ middle of its cell: s = (2 x + 1) / 32 - 1, t = 1 - (2 y + 1) / 32.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,10 +67,19 @@ class CompressedTextures(NamedTuple):
     """(m, 32, 4), alpha, a bit a texel, the leftmost in a byte's highest bit."""
 
 
-def joined(parts: Sequence[ViewTextures]) -> ViewTextures:
-    """One table of several, billboard after billboard."""
+def joined(parts: list[ViewTextures]) -> ViewTextures:
+    """One table of several, billboard after billboard; the list is empty afterwards.
+
+    Parts are let go one by one, so that not everything is there twice.
+    """
     counts = np.concatenate([np.diff(part.first) for part in parts])
-    return ViewTextures(
-        np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        *(np.concatenate(arrays) for arrays in zip(*(part[1:] for part in parts), strict=True)),
-    )
+    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    whole = [np.empty((first[-1], *field.shape[1:]), field.dtype) for field in parts[0][1:]]
+    at = 0
+    while parts:
+        part = parts.pop(0)
+        rows = slice(at, at + len(part.direction))
+        for field, own in zip(whole, part[1:], strict=True):
+            field[rows] = own
+        at = rows.stop
+    return ViewTextures(first, *whole)

@@ -9,8 +9,10 @@ paper leaves this out ("plain"), and takes the pillar in front of a wall for the
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -33,6 +35,8 @@ _LEAST_TEXELS = 12
 """That a view must show."""
 _LEAST_SHARE = 0.4
 """Of the texels that the billboard's best view shows; what fewer tell of the rest is a guess."""
+_VIEWS = 512
+"""That a thread samples at a time."""
 _MOST_SAMPLES = 3
 """Of a texel's side, where the photograph is finer than the texture."""
 
@@ -74,26 +78,30 @@ def view_textures(
     states = np.zeros((count, SIDE, SIDE), np.uint8)
     sharpness = np.zeros(count, np.float32)
     owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
-    _sample(
-        owner,
-        pictures,
-        billboards.centre,
-        billboards.voxel,
-        billboards.turns,
-        billboards.half_s.astype(np.float64),
-        billboards.half_t.astype(np.float64),
-        voxel_side,
-        photographs.pixels,
-        photographs.depth,
-        photographs.deviation,
-        photographs.intrinsics,
-        photographs.to_world,
-        photographs.codes,
-        plain,
-        colours,
-        states,
-        sharpness,
-    )
+    places = billboards.centre, billboards.voxel, billboards.turns
+    halves = billboards.half_s.astype(np.float64), billboards.half_t.astype(np.float64)
+
+    def sample(rows: slice) -> None:
+        _sample(
+            owner[rows],
+            pictures[rows],
+            *places,
+            *halves,
+            voxel_side,
+            photographs.pixels,
+            photographs.depth,
+            photographs.deviation,
+            photographs.intrinsics,
+            photographs.to_world,
+            photographs.codes,
+            plain,
+            colours[rows],
+            states[rows],
+            sharpness[rows],
+        )
+
+    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
+        list(threads.map(sample, (slice(at, at + _VIEWS) for at in range(0, count, _VIEWS))))
     seen = (states == SEEN).sum(axis=(1, 2))
     most = np.zeros(len(first) - 1, np.int64)
     np.maximum.at(most, owner, seen)
