@@ -117,7 +117,7 @@ def _still_share(checked: Checked) -> float:
             "still_share",
             "Share of the billboards that stand still.",
             _still_share,
-            at_most=1.0,
+            at_least=0.0,
             change=0.05,
         ),
     ),
