@@ -10,6 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+_CELL = 0.05
+"""Metres that points are apart before any is left out."""
 _FINER = 2
 """Samples along a pixel's side, as the billboards are drawn with."""
 
@@ -37,10 +39,9 @@ def drawn_points(
 
     Points (n, 3) are thinned on a grid as coarse as it has to be; each is a square of that grid.
     """
-    cell = 0.04
-    kept = _thinned(positions, cell)
+    cell, kept = _CELL, np.arange(len(positions))
     while len(kept) > most:
-        cell *= 1.1
+        cell *= 1.02
         kept = _thinned(positions, cell)
     width, height = (_FINER * side for side in size)
     fine = intrinsics.copy()
@@ -51,7 +52,7 @@ def drawn_points(
         depth = np.full((height, width), np.inf, np.float32)
         picture = np.zeros((height, width, 3), np.uint8)
         seen = (positions[kept] - pose[:3, 3]) @ pose[:3, :3]
-        _splat(seen, colours[kept], max(cell, 0.05), fine, depth, picture)
+        _splat(seen, colours[kept], cell, fine, depth, picture)
         shape = (size[1], _FINER, size[0], _FINER)
         hit = np.isfinite(depth).reshape(shape).sum(axis=(1, 3))
         total = picture.reshape(*shape, 3).sum(axis=(1, 3))
