@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     Result = tuple[xr.Dataset, Metadata]
 
 
+_UNSEEN = 2
+"""Frames that the flight leaves out: nobody before them saw the ground that they look at."""
+
+
 class FrameSettings(Settings):
     """The pictures."""
 
@@ -160,7 +164,7 @@ def street_frames(
     size = (drive_frames.sizes["x"], drive_frames.sizes["y"])
     held = poses[kept]
     beside = [frames.moved(pose, offset) for pose in held for offset in OFFSETS]
-    flight = frames.flight(poses, settings.flight_frames, settings.swerve)
+    flight = frames.flight(poses[_UNSEEN:], settings.flight_frames, settings.swerve)
     with frames.StreetStage(
         made, pages_of(texture_atlases), sky, size, supersampling=settings.supersampling
     ) as stage:

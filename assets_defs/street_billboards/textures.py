@@ -286,6 +286,7 @@ def view_textures(
                 farthest=settings.farthest_view,
             )
         )
+        del photographs  # before the next tile's are loaded
     views = joined(parts)
     dataset = xr.Dataset(
         {

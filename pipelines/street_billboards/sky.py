@@ -45,17 +45,20 @@ class SkyView(NamedTuple):
 def sky_map(views: Sequence[SkyView], height: int = 256) -> NDArray[np.float32]:
     """Mean radiance (height, 2 height, 3), z up, laid out as ``stage.Stage`` takes it.
 
-    Directions that no photograph shows take the nearest that one does; below the horizon, the
-    horizon's mean. All 0 where no photograph shows any.
+    Directions that no photograph shows take the nearest that one does; below the horizon it is the
+    mean of what the photographs show there. All 0 where no photograph shows any sky.
     """
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     width = 2 * height
     total = np.zeros((height * width, 3))
     counts = np.zeros(height * width)
+    ground, below = np.zeros(3), 0
     for view in views:
-        clear = _clear(view)
-        rays = _rays(view)[clear]
+        clear, rays = _clear(view), _rays(view)
+        low = decode_srgb(view.pixels[rays[..., 2] < 0] / 255.0)
+        ground, below = ground + low.sum(axis=0), below + len(low)
+        rays = rays[clear]
         row = np.minimum((np.arccos(rays[:, 2]) / np.pi * height).astype(int), height - 1)
         turn = 0.5 - np.arctan2(rays[:, 1], rays[:, 0]) / (2 * np.pi)
         texel = row * width + np.mod((turn * width).astype(int), width)
@@ -73,7 +76,7 @@ def sky_map(views: Sequence[SkyView], height: int = 256) -> NDArray[np.float32]:
     filled = sky[nearest[0][:, width : 2 * width], nearest[1][:, width : 2 * width] % width]
     smooth = gaussian_filter(filled, (1.0, 1.0, 0.0), mode=("nearest", "wrap", "nearest"))
     filled = np.where(known[..., None], filled, smooth)
-    filled[height // 2 :] = filled[height // 2 - 1].mean(axis=0)
+    filled[height // 2 :] = ground / below if below else filled[height // 2 - 1].mean(axis=0)
     return filled.astype(np.float32)
 
 
