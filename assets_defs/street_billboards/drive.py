@@ -198,11 +198,16 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
             for frame in chosen
         ]
     )
+    # Graphics are drawn in single precision: far from its zero, a map's grid would have no digits.
+    poses = drive.poses[list(chosen)]
+    origin = np.round(poses[0, 0, :3, 3])
+    poses[..., :3, 3] -= origin
     dataset = xr.Dataset(
         {
             "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
             "intrinsics": (("camera", "row", "column"), np.stack(intrinsics)),
-            "poses": (("frame", "camera", "axis", "column_4"), drive.poses[list(chosen)]),
+            "poses": (("frame", "camera", "axis", "column_4"), poses),
+            "origin": (("axis",), origin),
             "held_out": (("frame",), held_out(len(chosen))),
         }
     )
@@ -265,6 +270,7 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
             "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
             "intrinsics": (("camera", "row", "column"), plan.intrinsics),
             "poses": (("frame", "camera", "axis", "column_4"), plan.poses),
+            "origin": (("axis",), np.zeros(3)),
             "held_out": (("frame",), kept),
             "truth_depth": (("held", "y", "x"), np.array(truth_depth, np.float32)),
             "truth_pole": (("held", "y", "x"), np.array(truth_pole, bool)),

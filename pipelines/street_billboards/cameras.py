@@ -25,11 +25,6 @@ class Cameras(NamedTuple):
     height: int
 
 
-def places(cameras: Cameras) -> FloatArray:
-    """Where the cameras stand, (n, 3) in metres."""
-    return cameras.to_world[:, :3, 3]
-
-
 def projected(
     intrinsics: FloatArray, to_world: FloatArray, points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

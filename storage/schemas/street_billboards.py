@@ -20,6 +20,9 @@ DRIVE_FRAMES = Schema(
             "m",
             "From the camera's axes (right, down, forward) to the world's, z up",
         ),
+        "origin": Variable(
+            ("axis",), "float64", "m", "Where the drive's own world has this one's zero"
+        ),
         "held_out": Variable(
             ("frame",), "bool", "1", "Used to judge pictures and for nothing else"
         ),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import center_of_mass
 from scipy.spatial.transform import Rotation
 
-from pipelines.street_billboards.cameras import Cameras, places, points_at, projected
+from pipelines.street_billboards.cameras import points_at, projected
 from pipelines.street_billboards.centred_pictures import centred, centred_intrinsics
 from pipelines.street_billboards.frames import flight, moved
 from pipelines.street_billboards.view_directions import (
@@ -70,13 +70,6 @@ def test_axes_of_a_camera() -> None:
     pixels, depth = projected(lens, pose, np.array([[1.0, 10, 0], [0, 10, 1.0], [0, -3.0, 0]]))
     np.testing.assert_allclose(pixels[:2], [[6, 4], [5, 3]])
     np.testing.assert_allclose(depth, [10, 10, -3])
-
-
-def test_places_are_the_last_columns() -> None:
-    poses = np.stack([any_pose(np.random.default_rng(i)) for i in range(3)])
-    cameras = Cameras(np.tile(np.eye(3), (3, 1, 1)), poses, WIDTH, HEIGHT)
-    for place, pose in zip(places(cameras), poses, strict=True):
-        np.testing.assert_allclose(projected(np.eye(3), pose, place)[1], 0.0, atol=1e-12)
 
 
 # ---- directions ------------------------------------------------------------------------------
