@@ -206,7 +206,7 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
         {
             "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
             "intrinsics": (("camera", "row", "column"), np.stack(intrinsics)),
-            "poses": (("frame", "camera", "axis", "column_4"), poses),
+            "poses": (("frame", "camera", "row_4", "column_4"), poses),
             "origin": (("axis",), origin),
             "held_out": (("frame",), held_out(len(chosen))),
         }
@@ -269,7 +269,7 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
         {
             "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
             "intrinsics": (("camera", "row", "column"), plan.intrinsics),
-            "poses": (("frame", "camera", "axis", "column_4"), plan.poses),
+            "poses": (("frame", "camera", "row_4", "column_4"), plan.poses),
             "origin": (("axis",), np.zeros(3)),
             "held_out": (("frame",), kept),
             "truth_depth": (("held", "y", "x"), np.array(truth_depth, np.float32)),

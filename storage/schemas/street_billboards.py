@@ -15,7 +15,7 @@ DRIVE_FRAMES = Schema(
         ),
         "intrinsics": Variable(("camera", "row", "column"), "float64", "pixel", "K"),
         "poses": Variable(
-            ("frame", "camera", "axis", "column_4"),
+            ("frame", "camera", "row_4", "column_4"),
             "float64",
             "m",
             "From the camera's axes (right, down, forward) to the world's, z up",
