@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from assets_defs.checks import Check, Checked
 from assets_defs.pictures import table
-from assets_defs.settings import Preset, Settings
+from assets_defs.settings import Settings
 from assets_defs.street_billboards.datasets import (
     compressed_of,
     compressed_variables,
@@ -94,7 +94,7 @@ def _over_budget(checked: Checked) -> float:
 
 
 def _decoded_rmse(checked: Checked) -> float:
-    """Of every tenth billboard or so, decoded anew."""
+    """Of some two hundred billboards, decoded anew."""
     from pipelines.street_billboards.texture_figures import decoded_rmse
 
     return decoded_rmse(views_of(checked.input("view_textures")), compressed_of(checked.dataset))
@@ -205,8 +205,6 @@ class AtlasSettings(Settings):
     byte_budget: int = Field(
         4_000_000_000, ge=1, description="Bytes that all pages may take together"
     )
-
-    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {}
 
 
 def _atlas_pictures(dataset: xr.Dataset) -> Pictures:

@@ -226,9 +226,10 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
     import xarray as xr
 
     from pipelines.colour import to_8bit
+    from pipelines.street_billboards.cameras import lateral
     from pipelines.street_billboards.city import city
     from pipelines.street_billboards.photographing import CityStage
-    from pipelines.street_billboards.simulated_drive import lateral, photograph, plan_drive
+    from pipelines.street_billboards.simulated_drive import photograph, plan_drive
     from storage.readers.street_photographs import street_photographs
 
     width, height = settings.width, settings.width * 5 // 8

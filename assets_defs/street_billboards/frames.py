@@ -153,6 +153,7 @@ def street_frames(
 
     from pipelines.colour import to_8bit
     from pipelines.street_billboards import figures, frames
+    from pipelines.street_billboards.cameras import lateral
 
     made = billboards_of(billboards)
     sky = depth_maps["sky"].values
@@ -163,7 +164,7 @@ def street_frames(
     truth = drive_frames["photographs"].isel(frame=kept, camera=middle).values
     size = (drive_frames.sizes["x"], drive_frames.sizes["y"])
     held = poses[kept]
-    beside = [frames.moved(pose, offset) for pose in held for offset in OFFSETS]
+    beside = [lateral(pose, offset) for pose in held for offset in OFFSETS]
     flight = frames.flight(poses[_UNSEEN:], settings.flight_frames, settings.swerve)
     with frames.StreetStage(
         made, pages_of(texture_atlases), sky, size, supersampling=settings.supersampling

@@ -137,15 +137,6 @@ def pages(
     return [_packed(textures, plan) for plan in plans]
 
 
-def atlas_bytes(
-    textures: CompressedTextures, most: int = MOST_TEXELS, *, byte_budget: int | None = None
-) -> int:
-    """Bytes that ``pages`` will take, padding and records included. Raises as ``pages``."""
-    total = sum(_allocated(textures, plan) for plan in _plans(textures, most))
-    _check_budget(total, byte_budget)
-    return total
-
-
 def _check_budget(found: int, budget: int | None) -> None:
     if budget is not None and found > budget:
         raise ValueError(

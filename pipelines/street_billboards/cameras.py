@@ -52,3 +52,10 @@ def points_at(
         [*np.broadcast_arrays(across[None, :], down[:, None]), np.ones_like(depth)], axis=-1
     )
     return (rays * depth[..., None]) @ to_world[:3, :3].T + to_world[:3, 3]
+
+
+def lateral(to_world: FloatArray, offset: float) -> FloatArray:
+    """A camera's pose (4, 4) moved to its left by ``offset`` metres."""
+    moved = np.array(to_world, np.float64)
+    moved[:3, 3] -= offset * moved[:3, 0]
+    return moved

@@ -76,13 +76,6 @@ class StreetStage:
         return View(alone, alone + (1 - covered[..., None]) * behind, covered, sent)
 
 
-def moved(pose: FloatArray, offset: float) -> FloatArray:
-    """The pose (4, 4) moved to its left, in metres."""
-    made = pose.copy()
-    made[:3, 3] -= offset * pose[:3, 0]
-    return made
-
-
 def flight(poses: FloatArray, frames: int, swerve: float) -> FloatArray:
     """Poses (frames, 4, 4) along those of a drive (f, 4, 4), swerving ``swerve`` m to the left."""
     from scipy.spatial.transform import Rotation, Slerp

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.colour import to_8bit
+from pipelines.street_billboards.cameras import lateral
 
 FloatArray = NDArray[np.float64]
 
@@ -91,13 +92,6 @@ def _pose(x: float, y: float, heading: float, z: float) -> FloatArray:
     return np.array(
         [[sine, 0.0, cosine, x], [-cosine, 0.0, sine, y], [0.0, -1.0, 0.0, z], [0.0, 0.0, 0.0, 1.0]]
     )
-
-
-def lateral(pose: FloatArray, offset: float) -> FloatArray:
-    """A camera's pose (4, 4) moved to its left by ``offset`` metres."""
-    moved = np.array(pose, np.float64)
-    moved[:3, 3] -= offset * moved[:3, 0]
-    return moved
 
 
 def photograph(

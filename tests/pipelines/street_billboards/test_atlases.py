@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.atlases import Atlas, Page, arranged, atlas_bytes, pages
+from pipelines.street_billboards.atlases import Atlas, Page, arranged, pages
 from pipelines.street_billboards.decoding import decoded_views
 from pipelines.street_billboards.textures import SIDE
 from tests.pipelines.street_billboards.compressed_street import random_textures
@@ -131,7 +131,6 @@ def test_bytes_are_known_beforehand() -> None:
             for page in made
             for array in (*page.detail[:2], *page.tint[:2], page.views, page.masks, page.records)
         )
-        assert atlas_bytes(textures, most) == held
         assert sum(page.bytes + page.padding for page in made) == held
         sheets = [s for p in made for s in (p.detail[0], p.tint[0], p.views, p.masks)]
         assert max(max(sheet.shape[:2]) for sheet in sheets) <= most
@@ -149,13 +148,11 @@ def test_padding_of_many_is_small() -> None:
 
 def test_too_many_bytes_are_refused() -> None:
     textures = random_textures(MIXED, seed=5)
-    needed = atlas_bytes(textures)
+    needed = sum(page.bytes + page.padding for page in pages(textures))
     assert len(pages(textures, byte_budget=needed)) == 1
     message = rf"would take {needed} bytes; expected {needed - 1} at most \(byte_budget\)"
     with pytest.raises(ValueError, match=message):
         pages(textures, byte_budget=needed - 1)
-    with pytest.raises(ValueError, match=message):
-        atlas_bytes(textures, byte_budget=needed - 1)
 
 
 def test_what_cannot_be_packed_is_refused() -> None:

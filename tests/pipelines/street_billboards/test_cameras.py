@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import center_of_mass
 from scipy.spatial.transform import Rotation
 
-from pipelines.street_billboards.cameras import points_at, projected
+from pipelines.street_billboards.cameras import lateral, points_at, projected
 from pipelines.street_billboards.centred_pictures import centred, centred_intrinsics
-from pipelines.street_billboards.frames import flight, moved
+from pipelines.street_billboards.frames import flight
 from pipelines.street_billboards.view_directions import (
     CIRCLE,
     DIRECTIONS,
@@ -119,7 +119,7 @@ def drive(count: int) -> NDArray[np.float64]:
 def test_moved_goes_along_the_row_axis(offset: float) -> None:
     pose = any_pose(np.random.default_rng(4))
     before = pose.copy()
-    made = moved(pose, offset)
+    made = lateral(pose, offset)
     np.testing.assert_array_equal(pose, before)
     np.testing.assert_array_equal(made[:3, :3], pose[:3, :3])
     # In the axes of the camera, left is -x.

@@ -7,13 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.raycasting import build_scene, first_hits
-from pipelines.street_billboards.cameras import points_at
+from pipelines.street_billboards.cameras import lateral, points_at
 from pipelines.street_billboards.city import BEFORE, BEYOND, City, city
 from pipelines.street_billboards.city_light import sky_visibility
 from pipelines.street_billboards.city_materials import city_textures, evened, repeatable
 from pipelines.street_billboards.city_parts import MATERIALS, MEAN_TEXEL, POSTERS, Look, box, panel
 from pipelines.street_billboards.photographing import CityStage
-from pipelines.street_billboards.simulated_drive import lateral, plan_drive
+from pipelines.street_billboards.simulated_drive import plan_drive
 from storage.readers.street_photographs import street_photographs
 
 Photographs = dict[str, NDArray[np.uint8]]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.colour import decode_srgb, to_8bit
-from pipelines.street_billboards.cameras import projected
-from pipelines.street_billboards.simulated_drive import lateral, photograph, plan_drive
+from pipelines.street_billboards.cameras import lateral, projected
+from pipelines.street_billboards.simulated_drive import photograph, plan_drive
 
 
 def test_poses_are_rotations_that_look_ahead_with_the_horizon_level() -> None:
