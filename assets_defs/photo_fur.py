@@ -92,7 +92,7 @@ class PhotoSettings(Settings):
 
 
 def _photo_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.colour import to_8bit
+    from pipelines.drawing.colour import to_8bit
 
     return {"photograph": to_8bit(dataset["radiance"].values)}
 
@@ -132,9 +132,9 @@ def fur_photo(settings: PhotoSettings, source: Source, progress: Callable[[float
     """Read the photograph, or photograph the virtual pelt."""
     import xarray as xr
 
-    from pipelines.colour import luminance
+    from pipelines.drawing.colour import luminance
     from pipelines.photo_fur.photograph import expose, fit_size
-    from pipelines.photo_fur.virtual_pelt import virtual_pelt
+    from pipelines.virtual.pelt.pelt import virtual_pelt
     from storage.readers.photographs import builtin_photograph, read_photograph
 
     pixels = ("y", "x")
@@ -407,7 +407,7 @@ def _step_error(checked: Checked) -> float:
 
 
 def _stretch(checked: Checked) -> float:
-    from pipelines.geometry import texture_stretch
+    from pipelines.geometry.shapes import texture_stretch
 
     dataset = checked.dataset.load()
     return texture_stretch(
@@ -441,21 +441,21 @@ def shell_mesh(settings: MeshSettings, source: Source) -> Result:
     import numpy as np
     import xarray as xr
 
-    from pipelines import geometry
+    from pipelines.geometry import shapes
     from pipelines.photo_fur.shells import shell_heights, shell_vertices
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
         vertices, triangles, uvs = read_mesh(source.path)
         if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
-            vertices = geometry.turned_up(vertices)
-        mesh = geometry.make_mesh(vertices, triangles, uvs)
+            vertices = shapes.turned_up(vertices)
+        mesh = shapes.make_mesh(vertices, triangles, uvs)
     else:
         mesh = {
-            SQUARE: lambda: geometry.square(32),
-            "sphere": lambda: geometry.sphere(64),
-            "teapot": lambda: geometry.teapot(8),
-            "teapot-large": lambda: geometry.teapot(33),
+            SQUARE: lambda: shapes.square(32),
+            "sphere": lambda: shapes.sphere(64),
+            "teapot": lambda: shapes.teapot(8),
+            "teapot-large": lambda: shapes.teapot(33),
         }[source.key]()
     spread = mesh.vertices - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     thickness = settings.thickness or 0.06 * float(np.linalg.norm(spread, axis=1).max())
@@ -501,7 +501,7 @@ class FrameSettings(Settings):
 
 
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     return {"frames": contact_sheet(dataset["frames"].values)}
 

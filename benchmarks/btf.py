@@ -35,13 +35,13 @@ from assets_defs.neural_btf.datasets import compressed, payload_bytes
 from assets_defs.neural_btf.declaration import NONE, NetworkSettings
 from assets_defs.neural_btf.network import packed, training_data, training_plan
 from assets_defs.workspace import CHECKOUT, Workspace
-from pipelines.directions import Pairs, all_pairs, hemisphere_table
+from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
 from pipelines.lowrank import principal_components
 from pipelines.neural_btf.compressed import CompressedBtf, restoration_errors
-from pipelines.neural_btf.gonioreflectometer import Gonioreflectometer
 from pipelines.neural_btf.network import Decoder, decoder_arrays, decoder_of
 from pipelines.neural_btf.training import Plan, Trained, TrainingData, train
-from pipelines.neural_btf.virtual_cloth import MATERIALS, make_cloth
+from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
+from pipelines.virtual.cloth.weaves import MATERIALS, make_cloth
 from storage.readers.btf import open_btf
 from storage.schemas import find_schema
 from storage.versions import Slot, VersionedStore
@@ -329,7 +329,7 @@ def write_photographs(path: Path, directions: NDArray[np.float64], side: int) ->
     """A zip in the layout of UBO2003: woven noise, dimmed with the cosine, as JPEGs."""
     import cv2
 
-    from pipelines.colour import to_8bit
+    from pipelines.drawing.colour import to_8bit
 
     random = np.random.default_rng(0)
     coarse = random.random((side // 4, side // 4, 3))

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from assets_defs.workspace import CHECKOUT
-from pipelines import geometry
-from pipelines.colour import decode_srgb, encode_srgb, luminance
+from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance
+from pipelines.drawing.stage import Light, Shader, Stage, orbit, surface, texture
+from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import (
     Attenuation,
     depth_rank_correlation,
@@ -37,8 +38,7 @@ from pipelines.photo_fur.frames import (
     top_view_error,
 )
 from pipelines.photo_fur.shells import shell_vertices
-from pipelines.photo_fur.virtual_pelt import virtual_pelt
-from pipelines.stage import Light, Shader, Stage, orbit, surface, texture
+from pipelines.virtual.pelt.pelt import virtual_pelt
 from storage.readers.photographs import builtin_photograph
 
 LAYERS = 15
@@ -91,7 +91,7 @@ def _top_view() -> dict[str, Any]:
     errors = {}
     for name in ("grass", "chelsea"):
         photo = _photograph(name)
-        mesh = geometry.square(32)
+        mesh = shapes.square(32)
         shells = shell_vertices(mesh.vertices, mesh.normals, 0.05, 8)
         shape = photo.luminance.shape
         drawn = draw_frames(
@@ -136,12 +136,12 @@ def _derive() -> dict[str, Any]:
 # ---- drawing ---------------------------------------------------------------------------------
 
 
-def _large() -> tuple[geometry.Mesh, NDArray[np.float32]]:
-    mesh = geometry.teapot(33)
+def _large() -> tuple[shapes.Mesh, NDArray[np.float32]]:
+    mesh = shapes.teapot(33)
     return mesh, shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
 
 
-def _ours(photo: Photograph, mesh: geometry.Mesh, shells: NDArray[np.float32], fill: Fill) -> Any:
+def _ours(photo: Photograph, mesh: shapes.Mesh, shells: NDArray[np.float32], fill: Fill) -> Any:
     image = fur_texture(*photo, LAYERS, tails="end layers")
     return fur_surface(
         shells,
@@ -171,7 +171,7 @@ def _layer_images(photo: Photograph, fill: Fill) -> list[NDArray[np.uint8]]:
 
 
 def _usual(
-    photo: Photograph, mesh: geometry.Mesh, shells: NDArray[np.float32], fill: Fill
+    photo: Photograph, mesh: shapes.Mesh, shells: NDArray[np.float32], fill: Fill
 ) -> tuple[list[Any], list[Any]]:
     """A texture and a draw a layer, tips first as ours; everything else as ours."""
     shader = Shader(
@@ -265,7 +265,7 @@ def _speeds() -> dict[str, Any]:
     photo = _photograph("grass")
     figures: dict[str, Any] = {}
     for name, segments in (("fps_teapot", 8), ("fps_large", 33)):
-        mesh = geometry.teapot(segments)
+        mesh = shapes.teapot(segments)
         shells = shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
         with Stage(*WINDOW, background=BACKGROUND) as stage:
             stage.light(Light())
@@ -278,7 +278,7 @@ def _speeds() -> dict[str, Any]:
     return figures | {"window": list(WINDOW)}
 
 
-def _view(mesh: geometry.Mesh) -> Any:
+def _view(mesh: shapes.Mesh) -> Any:
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     x, y, z = (low + high) / 2
     radius = float(np.linalg.norm(mesh.vertices - (x, y, z), axis=1).max()) + 0.06

@@ -8,18 +8,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines import environments
-from pipelines.glass_scratches.bins import bin_weights
-from pipelines.glass_scratches.exact_table import exchange, leaving_share, solve
+from pipelines.geometry.solids import plate
+from pipelines.glass_scratches.drawing.frames import cameras
+from pipelines.glass_scratches.drawing.path_tracing import Strategy, Surface, make_surface, trace
 from pipelines.glass_scratches.figures import block_means
-from pipelines.glass_scratches.frames import cameras
-from pipelines.glass_scratches.layers import LayerSpec, coverage_maps, layer_arrays, make_layers
-from pipelines.glass_scratches.monte_carlo import shoot
-from pipelines.glass_scratches.path_tracing import Strategy, Surface, make_surface, trace
-from pipelines.glass_scratches.profiles import Shape, built_in_profile
-from pipelines.glass_scratches.sampling import make_lobe
-from pipelines.glass_scratches.tables import interpolation_error, lean_factors, scratch_table
-from pipelines.solids import plate
+from pipelines.glass_scratches.layers.scratch_layers import (
+    LayerSpec,
+    coverage_maps,
+    layer_arrays,
+    make_layers,
+)
+from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.exact import exchange, leaving_share, solve
+from pipelines.glass_scratches.tables.monte_carlo import shoot
+from pipelines.glass_scratches.tables.profiles import Shape, built_in_profile
+from pipelines.glass_scratches.tables.sampling import make_lobe
+from pipelines.glass_scratches.tables.scratch_table import (
+    interpolation_error,
+    lean_factors,
+    scratch_table,
+)
+from pipelines.light import environments
 
 BINS, RAYS, PATHS = 256, 10_000, 100
 """The paper's M, N, Nr."""

@@ -30,19 +30,26 @@ from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.ssdf_lighting.visibility import unpacked
 from assets_defs.workspace import CHECKOUT, Workspace
 from benchmarks.ssdf_precompute import SCENE
-from pipelines.ssdf_lighting import compact as coding
-from pipelines.ssdf_lighting.clustered_pca import ClusteredPca, clustered_pca, decoder_of_pca
-from pipelines.ssdf_lighting.compact_file import to_bytes
-from pipelines.ssdf_lighting.compact_memory import packed
-from pipelines.ssdf_lighting.decoding import decoded_rows, decoder_of
-from pipelines.ssdf_lighting.distances import distances_to_samples
+from pipelines.ssdf_lighting.compression import compact as coding
+from pipelines.ssdf_lighting.compression.clustered_pca import (
+    ClusteredPca,
+    clustered_pca,
+    decoder_of_pca,
+)
+from pipelines.ssdf_lighting.compression.compact_file import to_bytes
+from pipelines.ssdf_lighting.compression.compact_memory import packed
+from pipelines.ssdf_lighting.compression.decoding import decoded_rows, decoder_of
+from pipelines.ssdf_lighting.compression.triangle_clusters import (
+    clusters_by_distance,
+    clusters_by_position,
+)
+from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
+from pipelines.ssdf_lighting.distances.refined import refined_distances
+from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
+from pipelines.ssdf_lighting.distances.visibility import RayOrigins, visible_directions
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.figures import compression_error
-from pipelines.ssdf_lighting.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.refined import refined_distances
-from pipelines.ssdf_lighting.spherical_gaussians import integral, visible_integral
-from pipelines.ssdf_lighting.triangle_clusters import clusters_by_distance, clusters_by_position
-from pipelines.ssdf_lighting.visibility import RayOrigins, visible_directions
-from pipelines.ssdf_lighting.weighted_sphere import root_weights
+from pipelines.ssdf_lighting.light.spherical_gaussians import integral, visible_integral
 
 PAPER_CLUSTERS, PAPER_VALUES, PAPER_CONTRIBUTION = 64, 48, 0.9
 PAPER_ERRORS = {"error_48": 0.312758, "error_90": 1.4008}
@@ -314,7 +321,7 @@ def _edges(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """The edge inside a cell against many more directions; speed against all pairs."""
     from scipy.spatial import cKDTree
 
-    from pipelines.raycasting import build_scene
+    from pipelines.geometry.rays import build_scene
 
     scene, seen = scene_of(stored("scene_mesh")), stored("visibility")
     rays = build_scene(scene.vertices, scene.triangles)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.octahedral import resolution_of
-from pipelines.ssdf_lighting.weighted_sphere import root_weights
+from pipelines.ssdf_lighting.distances.octahedral import resolution_of
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 
 _SAMPLED = 1500
 _ZFP_TOLERANCES = np.geomspace(0.01, 0.6, 8)

@@ -17,11 +17,11 @@ from assets_defs.ssdf_lighting.frames import FrameSettings
 from assets_defs.ssdf_lighting.lights import LightSettings
 from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.workspace import CHECKOUT
-from pipelines import environments
-from pipelines.ssdf_lighting import frames
-from pipelines.ssdf_lighting.decoding import distances_along, matrix_along
-from pipelines.ssdf_lighting.environment_fit import fit_lights
-from pipelines.ssdf_lighting.pictures import error_map
+from pipelines.light import environments
+from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
+from pipelines.ssdf_lighting.drawing import frames
+from pipelines.ssdf_lighting.drawing.pictures import error_map
+from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.scene import Scene
 
 SIZE = (640, 480)

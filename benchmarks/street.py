@@ -33,14 +33,14 @@ from assets_defs.workspace import CHECKOUT, Workspace
 from benchmarks.street_codecs import blocks_coded
 from benchmarks.street_drive import KEYS, launch
 from benchmarks.street_points import drawn_points
-from pipelines.stage import Stage
-from pipelines.street_billboards import eigen_textures as coding
+from pipelines.drawing.stage import Stage
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
-from pipelines.street_billboards.depth_refinement import filled
-from pipelines.street_billboards.stage_view import CpuStreet, Street, stage_camera
-from pipelines.street_billboards.stereo import bad_share, disparity_defaults, match
-from pipelines.street_billboards.textures import SEEN, ViewTextures
+from pipelines.street_billboards.capture.depth_refinement import filled
+from pipelines.street_billboards.capture.stereo import bad_share, disparity_defaults, match
+from pipelines.street_billboards.drawing.stage_view import CpuStreet, Street, stage_camera
+from pipelines.street_billboards.textures import eigen_textures as coding
+from pipelines.street_billboards.textures.forms import SEEN, ViewTextures
 from storage.readers.street_photographs import motorcycle
 
 FRAMES = 100

@@ -19,11 +19,12 @@ from assets_defs.street_billboards.datasets import billboards_of, pages_of, view
 from assets_defs.street_billboards.textures import TextureSettings, view_textures
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
-from pipelines.colour import to_8bit
-from pipelines.ssdf_lighting.pictures import curve_picture
-from pipelines.street_billboards import eigen_textures, figures
-from pipelines.street_billboards.atlases import pages
-from pipelines.street_billboards.frames import StreetStage
+from pipelines.drawing.colour import to_8bit
+from pipelines.ssdf_lighting.drawing.pictures import curve_picture
+from pipelines.street_billboards import figures
+from pipelines.street_billboards.drawing.frames import StreetStage
+from pipelines.street_billboards.textures import eigen_textures
+from pipelines.street_billboards.textures.atlases import pages
 from storage.versions import VersionedStore
 
 FOLDER = Path(__file__).parent / "pictures"

@@ -87,8 +87,8 @@ def _training() -> str:
 def _drawing(picture: Path) -> str:
     from PIL import Image
 
-    from pipelines.geometry import teapot
-    from pipelines.stage import Light, Stage, orbit, surface
+    from pipelines.drawing.stage import Light, Stage, orbit, surface
+    from pipelines.geometry.shapes import teapot
 
     mesh = teapot(8)
     centre = tuple((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2)

@@ -21,7 +21,7 @@ ENVIRONMENTS = ("lamps", "sky", "uniform")
 
 
 def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:
-    from pipelines.glass_scratches.profiles import built_in_profile, cut_profile
+    from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
     from storage.readers.profiles import read_profile
 
     if source.path is not None:
@@ -31,7 +31,7 @@ def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:
 
 
 def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
-    from pipelines.solids import check_closed
+    from pipelines.geometry.solids import check_closed
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
@@ -47,7 +47,7 @@ def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settin
     from assets_defs.glass_scratches.frames import FrameSettings, check_environment_setting
     from assets_defs.glass_scratches.layers import LayerSettings, layer_spec
     from assets_defs.glass_scratches.tables import TableSettings
-    from pipelines.glass_scratches.tables import check_method
+    from pipelines.glass_scratches.tables.scratch_table import check_method
 
     walls = settings.get("scratch_table_2d")
     if isinstance(walls, TableSettings):
@@ -64,7 +64,7 @@ def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDAr
     """Settings side by side on one object: far and close, and under the moving light."""
     import numpy as np
 
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     made: dict[str, dict[str, xr.Dataset]] = {}
     for slot in slots:

@@ -79,8 +79,8 @@ def glass_object(settings: ObjectSettings, source: Source) -> Result:
     import numpy as np
     import xarray as xr
 
-    from pipelines.geometry import turned_up
-    from pipelines.solids import glass_teapot, make_solid, plate
+    from pipelines.geometry.shapes import turned_up
+    from pipelines.geometry.solids import glass_teapot, make_solid, plate
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
@@ -161,7 +161,7 @@ def _read_environment(name: str) -> NDArray[np.float32]:
 
 def environment(settings: FrameSettings) -> NDArray[np.float32]:
     """The environment's radiance (H, 2 H, 3), turned. Raises as `check_environment_setting`."""
-    from pipelines import environments
+    from pipelines.light import environments
 
     height = _ENVIRONMENT_HEIGHT
     if settings.environment == "lamps":
@@ -178,7 +178,7 @@ def environment(settings: FrameSettings) -> NDArray[np.float32]:
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.glass_scratches.pictures import furnace_picture
+    from pipelines.glass_scratches.drawing.pictures import furnace_picture
 
     pairs = zip(dataset["frames"].values, dataset["stage"].values, strict=True)
     return {
@@ -285,15 +285,20 @@ def glass_frames(
     import xarray as xr
 
     from assets_defs.glass_scratches.layers import layers_of
-    from pipelines.colour import to_8bit
-    from pipelines.environments import sampler
-    from pipelines.glass_scratches.frames import exposure, furnace, moving_light, trace_frames
-    from pipelines.glass_scratches.layers import layer_arrays
-    from pipelines.glass_scratches.path_tracing import make_surface
-    from pipelines.glass_scratches.sampling import lobe_of
-    from pipelines.glass_scratches.stage_view import ScratchedActor
-    from pipelines.glass_scratches.tables import Lean
-    from pipelines.solids import Solid
+    from pipelines.drawing.colour import to_8bit
+    from pipelines.geometry.solids import Solid
+    from pipelines.glass_scratches.drawing.frames import (
+        exposure,
+        furnace,
+        moving_light,
+        trace_frames,
+    )
+    from pipelines.glass_scratches.drawing.path_tracing import make_surface
+    from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
+    from pipelines.glass_scratches.layers.scratch_layers import layer_arrays
+    from pipelines.glass_scratches.tables.sampling import lobe_of
+    from pipelines.glass_scratches.tables.scratch_table import Lean
+    from pipelines.light.environments import sampler
 
     solid = Solid(
         glass_object["vertices"].values,

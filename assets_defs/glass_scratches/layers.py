@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.glass_scratches.layer_settings import LayerSpec
-    from pipelines.glass_scratches.layers import Layers
+    from pipelines.glass_scratches.layers.scratch_layers import Layers
+    from pipelines.glass_scratches.layers.settings import LayerSpec
 
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
@@ -74,7 +74,7 @@ class LayerSettings(Settings):
 def layer_spec(settings: LayerSettings) -> LayerSpec:
     """The settings as the type of `pipelines`. Raises ValueError for a resolution that is no power
     of two."""
-    from pipelines.glass_scratches.layer_settings import LayerSpec
+    from pipelines.glass_scratches.layers.settings import LayerSpec
 
     if settings.resolution & (settings.resolution - 1):
         raise ValueError(f"resolution is {settings.resolution}; expected a power of two.")
@@ -84,7 +84,7 @@ def layer_spec(settings: LayerSettings) -> LayerSpec:
 
 def layers_of(dataset: xr.Dataset) -> Layers:
     """The scratches of a `scratch_layers` dataset, with their search grid."""
-    from pipelines.glass_scratches.layers import join_features
+    from pipelines.glass_scratches.layers.scratch_layers import join_features
 
     return join_features(
         dataset["angle"].values,
@@ -105,7 +105,7 @@ def layers_of(dataset: xr.Dataset) -> Layers:
 def _layer_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.glass_scratches.layer_pictures import layers_picture
+    from pipelines.glass_scratches.layers.pictures import layers_picture
 
     stages = np.hstack(list(dataset["stages"].values))
     return {
@@ -132,7 +132,7 @@ def _coverage_error(checked: Checked) -> float | None:
 def _map_z(checked: Checked) -> float:
     """RMS z-score of the maps' means over 8 x 8 blocks against the scratches sampled anew."""
     from pipelines.glass_scratches.figures import block_z_rms
-    from pipelines.glass_scratches.layers import coverage_maps
+    from pipelines.glass_scratches.layers.scratch_layers import coverage_maps
 
     maps = checked.dataset["coverage"].values
     again = coverage_maps(layers_of(checked.dataset), maps.shape[1] // 2, 4 * MAP_SAMPLES)
@@ -164,8 +164,8 @@ def scratch_layers(settings: LayerSettings) -> Result:
     """Scatter the scratches and map their coverage."""
     import xarray as xr
 
-    from pipelines.glass_scratches.layer_pictures import stages
-    from pipelines.glass_scratches.layers import coverage_maps, make_layers
+    from pipelines.glass_scratches.layers.pictures import stages
+    from pipelines.glass_scratches.layers.scratch_layers import coverage_maps, make_layers
 
     spec = layer_spec(settings)
     made = make_layers(spec, settings.layer_seed)

@@ -46,7 +46,7 @@ class ProfileSettings(Settings):
 
 
 def _profile_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.glass_scratches.pictures import profile_picture
+    from pipelines.glass_scratches.drawing.pictures import profile_picture
 
     return {"profile": profile_picture(dataset["points"].values)}
 
@@ -88,7 +88,7 @@ def scratch_profile(settings: ProfileSettings, source: Source) -> Result:
     """Read the cross-section, or take a built-in one, between its crests."""
     import xarray as xr
 
-    from pipelines.glass_scratches.profiles import built_in_profile, cut_profile
+    from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
     from storage.readers.profiles import read_profile
 
     if source.path is not None:
@@ -131,13 +131,13 @@ class TableSettings(Settings):
 
 
 def _table_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.glass_scratches.pictures import table_picture
+    from pipelines.glass_scratches.drawing.pictures import table_picture
 
     return {"table": table_picture(dataset["rho"].values)}
 
 
 def _furnace_error(checked: Checked) -> float:
-    from pipelines.glass_scratches.exact_table import leaving_share
+    from pipelines.glass_scratches.tables.exact import leaving_share
 
     dataset = checked.dataset
     leaving = leaving_share(dataset["rho"].values)
@@ -209,8 +209,8 @@ def scratch_table_2d(settings: TableSettings, scratch_profile: xr.Dataset) -> Re
     """Solve for the table, or shoot paths."""
     import xarray as xr
 
-    from pipelines.glass_scratches.exact_table import leaving_share
-    from pipelines.glass_scratches.tables import scratch_table as make_table
+    from pipelines.glass_scratches.tables.exact import leaving_share
+    from pipelines.glass_scratches.tables.scratch_table import scratch_table as make_table
 
     method = settings.method or ("exact" if settings.roughness == 1.0 else "paths")
     table = make_table(
@@ -252,14 +252,14 @@ class LeanSettings(Settings):
 
 
 def _spatial_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.glass_scratches.pictures import lean_picture
+    from pipelines.glass_scratches.drawing.pictures import lean_picture
 
     return {"leans": lean_picture(dataset["factor"].values, dataset["gamma"].values)}
 
 
 def _sampler_p(checked: Checked) -> float:
     from pipelines.glass_scratches.figures import sampler_p_value
-    from pipelines.glass_scratches.sampling import lobe_of
+    from pipelines.glass_scratches.tables.sampling import lobe_of
 
     dataset, plane = checked.dataset, checked.input("scratch_table_2d")
     return sampler_p_value(
@@ -273,7 +273,7 @@ def _sampler_p(checked: Checked) -> float:
 
 
 def _interpolation_error(checked: Checked) -> float:
-    from pipelines.glass_scratches.tables import interpolation_error
+    from pipelines.glass_scratches.tables.scratch_table import interpolation_error
 
     settings = checked.record["settings"]
     bins = checked.dataset.sizes["out"]
@@ -319,8 +319,8 @@ def scratch_table(settings: LeanSettings, scratch_table_2d: xr.Dataset) -> Resul
     import numpy as np
     import xarray as xr
 
-    from pipelines.glass_scratches.sampling import make_lobe
-    from pipelines.glass_scratches.tables import LEANS, lean_factors
+    from pipelines.glass_scratches.tables.sampling import make_lobe
+    from pipelines.glass_scratches.tables.scratch_table import LEANS, lean_factors
 
     rho = scratch_table_2d["rho"].values
     lean = lean_factors(len(rho), settings.refractive_index, settings.fresnel)

@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.directions import Pairs
+    from pipelines.light.directions import Pairs
     from pipelines.neural_btf.compressed import CompressedBtf
 
 
 def pairs_of(dataset: xr.Dataset) -> Pairs:
     """Light and view of a dataset's photographs."""
-    from pipelines.directions import Pairs
+    from pipelines.light.directions import Pairs
 
     return Pairs(dataset["light"].values, dataset["view"].values)
 

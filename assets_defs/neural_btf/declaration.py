@@ -9,7 +9,7 @@ from pydantic import Field
 
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Dimension, Source, System
-from pipelines.neural_btf.virtual_cloth import MATERIALS
+from pipelines.virtual.cloth.weaves import MATERIALS
 from storage.readers.btf import open_btf
 from storage.versions import Slot, VersionedStore
 

@@ -82,7 +82,7 @@ def btf_images(
     """Open the photographs, or photograph the virtual cloth; both lazily, view by view."""
     import xarray as xr
 
-    from pipelines.directions import Pairs, all_pairs, hemisphere_table
+    from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
 
     if source.path is None:
         directions = hemisphere_table(settings.directions)
@@ -123,8 +123,8 @@ def _virtual_photographs(
     """Photographs first … last - 1, all of one view."""
     import threading
 
-    from pipelines.neural_btf.gonioreflectometer import Gonioreflectometer
-    from pipelines.neural_btf.virtual_cloth import make_cloth
+    from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
+    from pipelines.virtual.cloth.weaves import make_cloth
 
     lock = threading.Lock()  # the gonioreflectometer uses all cores by itself
     size = (settings.texels, settings.texels)

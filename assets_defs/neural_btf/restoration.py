@@ -39,7 +39,7 @@ class RestoreSettings(Settings):
 
 
 def _restored_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.directions import Pairs
+    from pipelines.light.directions import Pairs
     from pipelines.neural_btf.pictures import error_picture, restored_picture
 
     shown = Pairs(dataset["pair_light"].values, dataset["pair_view"].values)
@@ -142,7 +142,7 @@ def restored_images(
     import numpy as np
     import xarray as xr
 
-    from pipelines.directions import Pairs
+    from pipelines.light.directions import Pairs
     from pipelines.neural_btf.compressed import restoration_errors
     from pipelines.neural_btf.pictures import PAPER_PAIRS, nearest_images
 
@@ -203,7 +203,7 @@ class ClothSettings(Settings):
 
 
 def _cloth_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     count = dataset.sizes["frame"]
     shown = sorted({round(i * count / 6) for i in range(6)} & set(range(count)))

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.ssdf_lighting.compact import SharedBasis
-    from pipelines.ssdf_lighting.decoding import Decoder
+    from pipelines.ssdf_lighting.compression.compact import SharedBasis
+    from pipelines.ssdf_lighting.compression.decoding import Decoder
 
     Result = tuple[xr.Dataset, Metadata]
     Pictures = dict[str, NDArray[np.uint8]]
@@ -64,7 +64,7 @@ class ClusterSettings(Settings):
 
 def shared_basis_of(triangle_clusters: xr.Dataset) -> SharedBasis:
     """The shared basis that a `triangle_clusters` dataset holds."""
-    from pipelines.ssdf_lighting.compact import SharedBasis
+    from pipelines.ssdf_lighting.compression.compact import SharedBasis
 
     return SharedBasis(
         triangle_clusters["shared"].values,
@@ -85,7 +85,10 @@ def _unused(checked: Checked) -> float:
 
 
 def _compactness(checked: Checked) -> float:
-    from pipelines.ssdf_lighting.triangle_clusters import leading_coordinates, spread_inside
+    from pipelines.ssdf_lighting.compression.triangle_clusters import (
+        leading_coordinates,
+        spread_inside,
+    )
 
     dataset, mesh = checked.dataset, checked.input("scene_mesh")
     if checked.record["settings"]["space"] == "positions":
@@ -99,8 +102,8 @@ def _basis_error(checked: Checked) -> float:
     """Error of the shared basis on sampled vertices, over the error it was made for."""
     import numpy as np
 
+    from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
     from pipelines.ssdf_lighting.figures import sampled_rows
-    from pipelines.ssdf_lighting.weighted_sphere import root_weights
 
     dataset, matrix = checked.dataset, checked.input("ssdf_matrix")["distances"]
     rows = sampled_rows(len(matrix), 512)
@@ -111,7 +114,7 @@ def _basis_error(checked: Checked) -> float:
 
 
 def _cluster_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.ssdf_lighting.pictures import basis_picture, sizes_picture
+    from pipelines.ssdf_lighting.drawing.pictures import basis_picture, sizes_picture
 
     return {
         "shared-basis": basis_picture(dataset["shared"].values.T[:24]),
@@ -153,8 +156,11 @@ def triangle_clusters(
     import xarray as xr
 
     from pipelines.lowrank import right_singular_vectors
-    from pipelines.ssdf_lighting.triangle_clusters import clusters_by_distance, clusters_by_position
-    from pipelines.ssdf_lighting.weighted_sphere import root_weights, weighted_gram
+    from pipelines.ssdf_lighting.compression.triangle_clusters import (
+        clusters_by_distance,
+        clusters_by_position,
+    )
+    from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights, weighted_gram
 
     entries = ssdf_matrix["distances"].size
     vertices, triangles = scene_mesh["vertices"].values, scene_mesh["triangles"].values
@@ -250,10 +256,10 @@ def check_compression(
 
 def decoder_of_basis(ssdf_basis: xr.Dataset, vertices: int) -> Decoder:
     """Decodes what an `ssdf_basis` dataset holds, in either form."""
-    from pipelines.ssdf_lighting.clustered_pca import ClusteredPca, decoder_of_pca
-    from pipelines.ssdf_lighting.compact_file import from_bytes
-    from pipelines.ssdf_lighting.compact_memory import packed
-    from pipelines.ssdf_lighting.decoding import decoder_of
+    from pipelines.ssdf_lighting.compression.clustered_pca import ClusteredPca, decoder_of_pca
+    from pipelines.ssdf_lighting.compression.compact_file import from_bytes
+    from pipelines.ssdf_lighting.compression.compact_memory import packed
+    from pipelines.ssdf_lighting.compression.decoding import decoder_of
 
     if "file" in ssdf_basis:
         return decoder_of(packed(from_bytes(ssdf_basis["file"].values.tobytes())))
@@ -264,7 +270,7 @@ def decoder_of_basis(ssdf_basis: xr.Dataset, vertices: int) -> Decoder:
 
 def _sample(checked: Checked) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
     """Vertex numbers, distances found and distances wanted of some vertices."""
-    from pipelines.ssdf_lighting.decoding import decoded_rows
+    from pipelines.ssdf_lighting.compression.decoding import decoded_rows
     from pipelines.ssdf_lighting.figures import sampled_rows
 
     matrix = checked.input("ssdf_matrix")["distances"]
@@ -277,7 +283,7 @@ def _sampled_rmse(checked: Checked) -> float:
     """Of sampled vertices, decoded here, over that of the same vertices when it was made."""
     import numpy as np
 
-    from pipelines.ssdf_lighting.weighted_sphere import root_weights
+    from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 
     rows, found, wanted = _sample(checked)
     weighted = (found - wanted) * root_weights(wanted.shape[1])
@@ -312,7 +318,7 @@ def _border_step(checked: Checked) -> float:
     """Steps of the error across borders of clusters over those inside, some directions."""
     import numpy as np
 
-    from pipelines.ssdf_lighting.decoding import distances_along, matrix_along
+    from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
     from pipelines.ssdf_lighting.figures import border_step
 
     matrix, mesh = checked.input("ssdf_matrix")["distances"], checked.input("scene_mesh")
@@ -328,7 +334,7 @@ def _border_step(checked: Checked) -> float:
 
 
 def _basis_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.ssdf_lighting.pictures import error_histogram
+    from pipelines.ssdf_lighting.drawing.pictures import error_histogram
 
     return {"error": error_histogram(dataset["vertex_rmse"].values, float(dataset["rmse"]))}
 
@@ -389,11 +395,11 @@ def ssdf_basis(
     import numpy as np
     import xarray as xr
 
-    from pipelines.ssdf_lighting.clustered_pca import clustered_pca
-    from pipelines.ssdf_lighting.compact import searched, searched_for_bytes
-    from pipelines.ssdf_lighting.compact_file import to_bytes
-    from pipelines.ssdf_lighting.compact_memory import packed
-    from pipelines.ssdf_lighting.decoding import decoded_rows
+    from pipelines.ssdf_lighting.compression.clustered_pca import clustered_pca
+    from pipelines.ssdf_lighting.compression.compact import searched, searched_for_bytes
+    from pipelines.ssdf_lighting.compression.compact_file import to_bytes
+    from pipelines.ssdf_lighting.compression.compact_memory import packed
+    from pipelines.ssdf_lighting.compression.decoding import decoded_rows
     from pipelines.ssdf_lighting.figures import compression_error
 
     matrix = ssdf_matrix["distances"]

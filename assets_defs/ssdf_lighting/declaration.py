@@ -49,7 +49,7 @@ def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDAr
     """Scenes under their environments side by side, the light going around."""
     import numpy as np
 
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     made: dict[str, list[xr.Dataset]] = {}
     for slot in slots:

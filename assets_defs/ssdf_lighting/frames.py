@@ -48,8 +48,8 @@ class FrameSettings(Settings):
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.contact_sheet import contact_sheet
-    from pipelines.ssdf_lighting.pictures import error_map
+    from pipelines.drawing.contact_sheet import contact_sheet
+    from pipelines.ssdf_lighting.drawing.pictures import error_map
 
     first, reference = dataset["frames"].values[0], dataset["reference"].values
     uncompressed = dataset["uncompressed"].values
@@ -65,7 +65,7 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _psnr(checked: Checked, reference: str) -> float:
-    from pipelines.ssdf_lighting.frames import psnr
+    from pipelines.ssdf_lighting.drawing.frames import psnr
 
     dataset = checked.dataset
     return psnr(
@@ -143,8 +143,8 @@ def relit_frames(
     import numpy as np
     import xarray as xr
 
-    from pipelines.ssdf_lighting import frames
-    from pipelines.ssdf_lighting.decoding import distances_along, matrix_along
+    from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
+    from pipelines.ssdf_lighting.drawing import frames
 
     scene, lights = scene_of(scene_mesh), lights_of(environment_lights)
     size = (settings.width, settings.width * 3 // 4)

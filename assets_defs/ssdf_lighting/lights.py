@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.ssdf_lighting.spherical_gaussians import Lights
+    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
@@ -44,20 +44,20 @@ class LightSettings(Settings):
 
 def lights_of(environment_lights: xr.Dataset) -> Lights:
     """The lights of an `environment_lights` dataset."""
-    from pipelines.ssdf_lighting.spherical_gaussians import Lights
+    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 
     names = ("axes", "sharpness", "amplitudes")
     return Lights(*(environment_lights[name].values for name in names))
 
 
 def _flux_error(checked: Checked) -> float:
-    from pipelines.ssdf_lighting.environment_fit import flux_error
+    from pipelines.ssdf_lighting.light.environment_fit import flux_error
 
     return flux_error(lights_of(checked.dataset), checked.dataset["radiance"].values)
 
 
 def _irradiance_error(checked: Checked) -> float:
-    from pipelines.ssdf_lighting.environment_fit import judged
+    from pipelines.ssdf_lighting.light.environment_fit import judged
 
     dataset = checked.dataset
     return judged(lights_of(dataset), dataset["radiance"].values).irradiance_error
@@ -70,9 +70,9 @@ def _tone_error(checked: Checked) -> float:
 def _light_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.colour import exposure, to_8bit
-    from pipelines.environments import texel_directions
-    from pipelines.ssdf_lighting.spherical_gaussians import evaluate
+    from pipelines.drawing.colour import exposure, to_8bit
+    from pipelines.light.environments import texel_directions
+    from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
 
     radiance = dataset["radiance"].values
     again = evaluate(lights_of(dataset), texel_directions(len(radiance)))
@@ -117,8 +117,8 @@ def environment_lights(
     """Fit spherical Gaussians to the environment."""
     import xarray as xr
 
-    from pipelines import environments
-    from pipelines.ssdf_lighting.environment_fit import averaged, fit_lights, flux_error
+    from pipelines.light import environments
+    from pipelines.ssdf_lighting.light.environment_fit import averaged, fit_lights, flux_error
     from storage.readers.environments import read_environment
 
     if source.path is not None:

@@ -16,7 +16,7 @@ from storage.schemas import ssdf_lighting as schemas
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipelines.ssdf_lighting.microfacets import Materials
+    from pipelines.ssdf_lighting.light.microfacets import Materials
     from pipelines.ssdf_lighting.scene import Scene
 
     Result = tuple[xr.Dataset, Metadata]
@@ -41,8 +41,8 @@ class SceneSettings(Settings):
 def _loaded(source: Source, settings: SceneSettings) -> Scene:
     import numpy as np
 
-    from pipelines.geometry import turned_up
-    from pipelines.ssdf_lighting.microfacets import Materials
+    from pipelines.geometry.shapes import turned_up
+    from pipelines.ssdf_lighting.light.microfacets import Materials
     from pipelines.ssdf_lighting.scene import built_in_scene, make_scene
     from storage.readers.scenes import read_scene
 
@@ -75,7 +75,7 @@ def check_size(name: str, vertices: int, settings: Settings) -> int:
     """The number of directions. Raises ValueError where the matrix needs more bytes than allowed,
     and for a number that is no octahedral map's."""
     from assets_defs.ssdf_lighting.visibility import VisibilitySettings
-    from pipelines.ssdf_lighting.octahedral import resolution_of
+    from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 
     assert isinstance(settings, VisibilitySettings)
     resolution_of(settings.directions)
@@ -90,7 +90,7 @@ def check_size(name: str, vertices: int, settings: Settings) -> int:
 
 def materials_of(scene_mesh: xr.Dataset) -> Materials:
     """The materials of a `scene_mesh` dataset."""
-    from pipelines.ssdf_lighting.microfacets import Materials
+    from pipelines.ssdf_lighting.light.microfacets import Materials
 
     names = ("albedo", "specular", "roughness")
     return Materials(*(scene_mesh[name].values for name in names))

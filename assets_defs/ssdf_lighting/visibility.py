@@ -78,7 +78,7 @@ def unpacked(visibility: xr.Dataset) -> NDArray[np.bool_]:
 
 
 def _visibility_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.ssdf_lighting.pictures import sky_picture
+    from pipelines.ssdf_lighting.drawing.pictures import sky_picture
 
     return {"visible-share": sky_picture(unpacked(dataset))}
 
@@ -113,9 +113,13 @@ def visibility(
     import numpy as np
     import xarray as xr
 
-    from pipelines.raycasting import build_scene
-    from pipelines.ssdf_lighting.octahedral import resolution_of, solid_angles, texel_directions
-    from pipelines.ssdf_lighting.visibility import (
+    from pipelines.geometry.rays import build_scene
+    from pipelines.ssdf_lighting.distances.octahedral import (
+        resolution_of,
+        solid_angles,
+        texel_directions,
+    )
+    from pipelines.ssdf_lighting.distances.visibility import (
         RayOrigins,
         ray_origins,
         stand_ins,
@@ -232,10 +236,10 @@ def ssdf_matrix(
     import numpy as np
     import xarray as xr
 
-    from pipelines.raycasting import build_scene
-    from pipelines.ssdf_lighting.distances import distances_to_samples
-    from pipelines.ssdf_lighting.refined import refined_distances
-    from pipelines.ssdf_lighting.visibility import RayOrigins
+    from pipelines.geometry.rays import build_scene
+    from pipelines.ssdf_lighting.distances.refined import refined_distances
+    from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
+    from pipelines.ssdf_lighting.distances.visibility import RayOrigins
 
     scene = scene_of(scene_mesh)
     rays = build_scene(scene.vertices, scene.triangles)

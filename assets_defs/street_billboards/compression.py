@@ -81,7 +81,7 @@ class EigenSettings(Settings):
 
 
 def _eigen_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.street_billboards.pictures import eigen_sheet
+    from pipelines.street_billboards.drawing.pictures import eigen_sheet
 
     return {"eigen-images": eigen_sheet(compressed_of(dataset))}
 
@@ -95,7 +95,7 @@ def _over_budget(checked: Checked) -> float:
 
 def _decoded_rmse(checked: Checked) -> float:
     """Of some two hundred billboards, decoded anew."""
-    from pipelines.street_billboards.texture_figures import decoded_rmse
+    from pipelines.street_billboards.textures.figures import decoded_rmse
 
     return decoded_rmse(views_of(checked.input("view_textures")), compressed_of(checked.dataset))
 
@@ -163,7 +163,7 @@ def eigen_textures(
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards import eigen_textures as coding
+    from pipelines.street_billboards.textures import eigen_textures as coding
 
     views, turns = views_of(view_textures), billboards["turns"].values
     if settings.coding == "paper":
@@ -208,14 +208,14 @@ class AtlasSettings(Settings):
 
 
 def _atlas_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.street_billboards.pictures import atlas_picture
+    from pipelines.street_billboards.drawing.pictures import atlas_picture
 
     return {"detail": atlas_picture(pages_of(dataset)[0])}
 
 
 def _unpacked_error(checked: Checked) -> float:
     """Largest difference of sampled billboards read from the pages and decoded, in codes."""
-    from pipelines.street_billboards.texture_figures import unpacked_error
+    from pipelines.street_billboards.textures.figures import unpacked_error
 
     stored = checked.input("eigen_textures")
     return unpacked_error(pages_of(checked.dataset), compressed_of(stored))
@@ -281,8 +281,8 @@ def texture_atlases(
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards.atlases import pages
     from pipelines.street_billboards.billboards import HEADER_BYTES
+    from pipelines.street_billboards.textures.atlases import pages
 
     textures = compressed_of(eigen_textures)
     made = pages(textures, settings.most_texels, byte_budget=settings.byte_budget)

@@ -10,18 +10,18 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.atlases import Page
+    from pipelines.geometry.cameras import Cameras
     from pipelines.street_billboards.billboards import Billboards
-    from pipelines.street_billboards.cameras import Cameras
-    from pipelines.street_billboards.point_fusion import FrameViews
-    from pipelines.street_billboards.textures import CompressedTextures, ViewTextures
+    from pipelines.street_billboards.capture.point_fusion import FrameViews
+    from pipelines.street_billboards.textures.atlases import Page
+    from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
 
 
 def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> FrameViews:
     """The photographs of some frames that are not held out, one row a photograph."""
     import numpy as np
 
-    from pipelines.street_billboards.point_fusion import FrameViews
+    from pipelines.street_billboards.capture.point_fusion import FrameViews
 
     frames = depths["frame"].values[taken]
     cameras = drive.sizes["camera"]
@@ -44,7 +44,7 @@ def taken_cameras(drive: xr.Dataset) -> Cameras:
     """All cameras where they took what is not held out."""
     import numpy as np
 
-    from pipelines.street_billboards.cameras import Cameras
+    from pipelines.geometry.cameras import Cameras
 
     poses = drive["poses"].values[~drive["held_out"].values]
     lenses = np.broadcast_to(drive["intrinsics"].values, (*poses.shape[:2], 3, 3))
@@ -69,14 +69,14 @@ def billboards_of(dataset: xr.Dataset) -> Billboards:
 
 def views_of(dataset: xr.Dataset) -> ViewTextures:
     """A `view_textures` dataset's textures."""
-    from pipelines.street_billboards.textures import ViewTextures
+    from pipelines.street_billboards.textures.forms import ViewTextures
 
     return ViewTextures(*(dataset[name].values for name in ViewTextures._fields))
 
 
 def compressed_of(dataset: xr.Dataset) -> CompressedTextures:
     """An `eigen_textures` dataset's textures."""
-    from pipelines.street_billboards.textures import CompressedTextures
+    from pipelines.street_billboards.textures.forms import CompressedTextures
 
     def channels(name: str) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         first, second, third = (dataset[f"{name}_{number}"].values for number in range(3))
@@ -153,7 +153,7 @@ def pages_of(dataset: xr.Dataset) -> list[Page]:
     """A `texture_atlases` dataset's pages."""
     import numpy as np
 
-    from pipelines.street_billboards.atlases import Atlas, Page
+    from pipelines.street_billboards.textures.atlases import Atlas, Page
 
     names = ("detail", "detail_scales", "tint", "tint_scales", "views", "masks")
     flat = {name: dataset[name].values for name in (*names, "records")}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.point_fusion import Points
+    from pipelines.street_billboards.capture.point_fusion import Points
 
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
@@ -41,8 +41,8 @@ class DepthSettings(Settings):
 
 
 def _depth_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.colour import to_8bit
-    from pipelines.street_billboards.pictures import depth_picture
+    from pipelines.drawing.colour import to_8bit
+    from pipelines.street_billboards.drawing.pictures import depth_picture
 
     middle = dataset.sizes["taken"] // 2
     sky = dataset["sky"].values
@@ -54,8 +54,8 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
 
 def _stereo_bad(checked: Checked) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
-    from pipelines.street_billboards.depth_refinement import filled
-    from pipelines.street_billboards.stereo import bad_share, match
+    from pipelines.street_billboards.capture.depth_refinement import filled
+    from pipelines.street_billboards.capture.stereo import bad_share, match
     from storage.readers.street_photographs import motorcycle
 
     pair = motorcycle()
@@ -65,8 +65,8 @@ def _stereo_bad(checked: Checked) -> float:
 
 def _depth_error(checked: Checked) -> float | None:
     """Against the true depth of held-out frames, which are matched for this alone."""
-    from pipelines.street_billboards.stereo import depth_maps
-    from pipelines.street_billboards.stereo_figures import depth_error
+    from pipelines.street_billboards.capture.stereo import depth_maps
+    from pipelines.street_billboards.capture.stereo_figures import depth_error
 
     drive = checked.input("drive_frames")
     if "truth_depth" not in drive:
@@ -130,8 +130,8 @@ def depth_maps(
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards import stereo
-    from pipelines.street_billboards.sky import SkyView, sky_map, sky_pixels
+    from pipelines.street_billboards.capture import stereo
+    from pipelines.street_billboards.capture.sky import SkyView, sky_map, sky_pixels
 
     taken = np.flatnonzero(~drive_frames["held_out"].values)
     intrinsics, poses = drive_frames["intrinsics"].values, drive_frames["poses"].values
@@ -192,7 +192,7 @@ class PointSettings(Settings):
 
 
 def _point_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.street_billboards.pictures import points_picture
+    from pipelines.street_billboards.drawing.pictures import points_picture
 
     return {"points": points_picture(dataset["positions"].values, dataset["colours"].values)}
 
@@ -211,7 +211,7 @@ def _points_a_metre(checked: Checked) -> float:
 
 def _stray_share(checked: Checked) -> float | None:
     """Against the true depth of held-out frames: a point before it hangs in the air."""
-    from pipelines.street_billboards.stereo_figures import stray_share
+    from pipelines.street_billboards.capture.stereo_figures import stray_share
 
     drive = checked.input("drive_frames")
     if "truth_depth" not in drive:
@@ -281,9 +281,9 @@ def street_points(
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards.exposure import exposure_gains
-    from pipelines.street_billboards.observations import observed
-    from pipelines.street_billboards.point_fusion import agreement, consistent_points, fused
+    from pipelines.street_billboards.capture.exposure import exposure_gains
+    from pipelines.street_billboards.capture.point_fusion import agreement, consistent_points, fused
+    from pipelines.street_billboards.textures.observations import observed
 
     count, cameras = depth_maps.sizes["taken"], drive_frames.sizes["camera"]
     confirmed = np.full(count, np.nan)

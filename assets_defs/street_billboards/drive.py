@@ -59,8 +59,8 @@ def check_agreement(drive: Drive, name: str) -> None:
     """Whether three frames in the middle of a drive show one world. Raises ValueError."""
     import numpy as np
 
-    from pipelines.street_billboards.point_fusion import FrameViews, agreement
-    from pipelines.street_billboards.stereo import depth_maps
+    from pipelines.street_billboards.capture.point_fusion import FrameViews, agreement
+    from pipelines.street_billboards.capture.stereo import depth_maps
 
     middle = min(max(len(drive.times) // 2, 1), len(drive.times) - 2)
     views = []
@@ -94,7 +94,7 @@ def metres_of(source: Source, settings: Settings) -> float:
 def _drive_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     count = dataset.sizes["frame"]
     shown = dataset["photographs"].isel(frame=sorted({0, count // 2}))
@@ -176,7 +176,7 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards.centred_pictures import centred, centred_intrinsics
+    from pipelines.street_billboards.capture.centred_pictures import centred, centred_intrinsics
 
     count = len(drive.times)
     stop = count if settings.stop is None else settings.stop
@@ -225,11 +225,11 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
     import numpy as np
     import xarray as xr
 
-    from pipelines.colour import to_8bit
-    from pipelines.street_billboards.cameras import lateral
-    from pipelines.street_billboards.city import city
-    from pipelines.street_billboards.photographing import CityStage
-    from pipelines.street_billboards.simulated_drive import photograph, plan_drive
+    from pipelines.drawing.colour import to_8bit
+    from pipelines.geometry.cameras import lateral
+    from pipelines.virtual.city.city import city
+    from pipelines.virtual.city.photographing import CityStage
+    from pipelines.virtual.city.simulated_drive import photograph, plan_drive
     from storage.readers.street_photographs import street_photographs
 
     width, height = settings.width, settings.width * 5 // 8

@@ -44,7 +44,7 @@ class FrameSettings(Settings):
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.contact_sheet import contact_sheet
+    from pipelines.drawing.contact_sheet import contact_sheet
 
     truth, rendered = dataset["truth"].values, dataset["rendered"].values
     sheet = np.concatenate([truth[:2], rendered[:2], dataset["alone"].values[:2]])
@@ -151,9 +151,10 @@ def street_frames(
     import numpy as np
     import xarray as xr
 
-    from pipelines.colour import to_8bit
-    from pipelines.street_billboards import figures, frames
-    from pipelines.street_billboards.cameras import lateral
+    from pipelines.drawing.colour import to_8bit
+    from pipelines.geometry.cameras import lateral
+    from pipelines.street_billboards import figures
+    from pipelines.street_billboards.drawing import frames
 
     made = billboards_of(billboards)
     sky = depth_maps["sky"].values

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.cameras import Cameras
-    from pipelines.street_billboards.view_textures import Photographs
+    from pipelines.geometry.cameras import Cameras
+    from pipelines.street_billboards.textures.view_textures import Photographs
 
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
@@ -53,7 +53,7 @@ class BillboardSettings(Settings):
 
 
 def _billboard_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.street_billboards.pictures import plan_picture
+    from pipelines.street_billboards.drawing.pictures import plan_picture
 
     return {"plan": plan_picture(billboards_of(dataset))}
 
@@ -174,7 +174,7 @@ class TextureSettings(Settings):
 
 
 def _view_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.street_billboards.pictures import views_sheet
+    from pipelines.street_billboards.drawing.pictures import views_sheet
 
     return {"views": views_sheet(views_of(dataset))}
 
@@ -188,8 +188,8 @@ def _sampling_error(checked: Checked) -> float:
     """Sampled anew with plain NumPy from all photographs: some must show what is stored."""
     import numpy as np
 
-    from pipelines.street_billboards.texture_figures import sampling_error
-    from pipelines.street_billboards.textures import ViewTextures
+    from pipelines.street_billboards.textures.figures import sampling_error
+    from pipelines.street_billboards.textures.forms import ViewTextures
 
     drive, depths = checked.input("drive_frames"), checked.input("depth_maps")
     stored, dataset = checked.input("billboards"), checked.dataset
@@ -215,7 +215,7 @@ def _views_each(checked: Checked) -> float:
 
 def _codes(points: xr.Dataset, frames: slice) -> NDArray[np.uint8]:
     """Codes (photographs, 256, 3) that even out exposures."""
-    from pipelines.street_billboards.exposure import evening_codes
+    from pipelines.street_billboards.capture.exposure import evening_codes
 
     return evening_codes(points["gains"].values[frames].reshape(-1, 3))
 
@@ -262,8 +262,8 @@ def view_textures(
     import numpy as np
     import xarray as xr
 
-    from pipelines.street_billboards import view_textures as sampling
-    from pipelines.street_billboards.textures import joined
+    from pipelines.street_billboards.textures import view_textures as sampling
+    from pipelines.street_billboards.textures.forms import joined
 
     tiles = billboards["tile"].values
     places, cameras = viewers(drive_frames), taken_cameras(drive_frames)
@@ -310,7 +310,7 @@ def _frames_that_see(
     """Frames of which some camera has some voxel before it, not too far away."""
     import numpy as np
 
-    from pipelines.street_billboards.cameras import projected
+    from pipelines.geometry.cameras import projected
 
     seen = np.zeros(len(cameras.to_world), bool)
     for number, pose in enumerate(cameras.to_world):
@@ -329,8 +329,8 @@ def _photographs(
     import numba
     import numpy as np
 
-    from pipelines.street_billboards.surface_depth import surface_depth
-    from pipelines.street_billboards.view_textures import Photographs
+    from pipelines.street_billboards.capture.surface_depth import surface_depth
+    from pipelines.street_billboards.textures.view_textures import Photographs
 
     views = frame_views(drive, depths, frames)
     places = views.poses[:, :3, 3]

@@ -6,10 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.glass_scratches import sampling
-from pipelines.glass_scratches.bins import bin_weights
-from pipelines.glass_scratches.monte_carlo import shoot
-from pipelines.glass_scratches.sampling import Lobe
+from pipelines.glass_scratches.tables import sampling
+from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.monte_carlo import shoot
+from pipelines.glass_scratches.tables.sampling import Lobe
 
 BLOCKS = 16
 _INCIDENCES, _PATHS = 16, 20_000

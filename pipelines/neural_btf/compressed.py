@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from pipelines.directions import Pairs, stereographic_of_vectors
+from pipelines.light.directions import Pairs, stereographic_of_vectors
 from pipelines.neural_btf.network import Decoder, device, direction_inputs
 from pipelines.neural_btf.pool import Read
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.directions import Pairs
+from pipelines.light.directions import Pairs
 from pipelines.neural_btf.network import HIDDEN, LATENTS
 
 DECODER_PARAMETERS = 12 * HIDDEN + HIDDEN + 2 * (HIDDEN * HIDDEN + HIDDEN) + HIDDEN * 3 + 3

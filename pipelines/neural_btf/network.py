@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from pipelines.directions import Pairs, stereographic
+from pipelines.light.directions import Pairs, stereographic
 
 LATENTS = 8
 HIDDEN = 106

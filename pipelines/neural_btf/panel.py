@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import exposure, to_8bit
-from pipelines.directions import unit_vectors
+from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.stage import PAINTED, Camera, Stage, orbit, surface
+from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.stage import PAINTED, Camera, Stage, orbit, surface
 
 BACKGROUND = (0.02, 0.022, 0.026)
 LIGHT_THETA = math.radians(50.0)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import exposure, to_8bit
-from pipelines.contact_sheet import contact_sheet
-from pipelines.directions import Pairs, angles_between, unit_vectors
-from pipelines.plots import drawn, new_figure
+from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.contact_sheet import contact_sheet
+from pipelines.drawing.plots import drawn, new_figure
+from pipelines.light.directions import Pairs, angles_between, unit_vectors
 
 _DIFFERENCE_TIMES = 4
 _SHOWN_PAIRS = ((0, 0, 0, 0), (0, 0, 45, 90), (0, 0, 60, 0), (60, 0, 30, 180), (60, 90, 60, 90),

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import decode_srgb
+from pipelines.drawing.colour import decode_srgb
 
 Tails = Literal["end layers", "dropped"]
 

@@ -17,9 +17,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import to_8bit
+from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.stage import Shader, Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
-from pipelines.stage import Shader, Wrap, surface, texture
 
 Fill = Literal["columns", "bands"]
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import to_8bit
+from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.stage import Camera, Light, Stage, fitting_distance, orbit
 from pipelines.photo_fur.attenuation import Attenuation, Tails
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
-from pipelines.stage import Camera, Light, Stage, fitting_distance, orbit
 
 BACKGROUND = (0.32, 0.34, 0.37)
 LEAST_SIDE = 384

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.plots import drawn, new_figure
 from pipelines.photo_fur.attenuation import Attenuation
-from pipelines.plots import drawn, new_figure
 
 
 def decay_picture(

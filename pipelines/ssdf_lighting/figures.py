@@ -8,10 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.mesh_repair import edge_ends
-from pipelines.ssdf_lighting.distances import NO_EDGE
-from pipelines.ssdf_lighting.octahedral import resolution_of, solid_angles, texel_directions
-from pipelines.ssdf_lighting.visible_edge import delaunay_sides
+from pipelines.geometry.repair import edge_ends
+from pipelines.ssdf_lighting.distances.octahedral import (
+    resolution_of,
+    solid_angles,
+    texel_directions,
+)
+from pipelines.ssdf_lighting.distances.signed_distance import NO_EDGE
+from pipelines.ssdf_lighting.distances.visible_edge import delaunay_sides
 
 FloatArray = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines import geometry
-from pipelines.mesh_repair import repair
-from pipelines.solids import creased_normals
-from pipelines.ssdf_lighting.microfacets import Materials
+from pipelines.geometry import shapes
+from pipelines.geometry.repair import repair
+from pipelines.geometry.solids import creased_normals
+from pipelines.ssdf_lighting.light.microfacets import Materials
 
 FloatArray = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def make_scene(
     """
     points = np.array(vertices, np.float64)
     corners = np.asarray(triangles)
-    geometry.check_arrays(points, corners)
+    shapes.check_arrays(points, corners)
     used = points[np.unique(corners)]
     middle = (used.min(axis=0) + used.max(axis=0)) / 2.0
     scale = float(np.linalg.norm(used - middle, axis=1).max())
@@ -96,7 +96,7 @@ def built_in_scene(name: str, segments: int, floor: int) -> Scene:
     along the floor's side (64: 4225 vertices). Raises ValueError for another name.
     """
     if name == "teapot":
-        pot = geometry.teapot(segments)
+        pot = shapes.teapot(segments)
         low = pot.vertices[:, 2].min()
         ground = _floor(floor, 5.0, low)
         materials = Materials(
@@ -105,7 +105,7 @@ def built_in_scene(name: str, segments: int, floor: int) -> Scene:
         return _joined([(pot.vertices, pot.triangles), ground], materials)
     if name == "court":
         n = max(2, segments // 2)
-        ball = geometry.sphere(2 * n)
+        ball = shapes.sphere(2 * n)
         walls = [
             _box((-1.2, -0.8, 0.0), (-1.1, 0.06, 1.0), n),
             _box((-1.2, 0.1, 0.0), (-1.1, 0.9, 1.0), n),
@@ -152,13 +152,13 @@ def _together(meshes: Sequence[_Mesh]) -> _Mesh:
 
 
 def _floor(segments: int, size: float, height: float) -> _Mesh:
-    flat = geometry.square(segments)
+    flat = shapes.square(segments)
     return flat.vertices * [size, size, 0.0] + [0.0, 0.0, height], flat.triangles
 
 
 def _box(low: Sequence[float], high: Sequence[float], segments: int) -> _Mesh:
     """A closed box, each face ``segments`` x ``segments`` pairs of triangles."""
-    face = geometry.square(segments)
+    face = shapes.square(segments)
     unit = face.vertices + np.array([0.0, 0.0, 0.5])
     turns = [
         np.eye(3),

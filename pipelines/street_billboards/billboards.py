@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.cameras import Cameras, projected
+from pipelines.geometry.cameras import Cameras, projected
 from pipelines.street_billboards.octree import Leaves, neighbours
-from pipelines.street_billboards.view_directions import CIRCLE, DIRECTIONS, SPACING
+from pipelines.street_billboards.textures.view_directions import CIRCLE, DIRECTIONS, SPACING
 
 OVERLAP = 0.03
 """By how much a voxel is enlarged on every side, so that neighbours leave no crack."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.colour import decode_srgb, encode_srgb
+from pipelines.drawing.colour import decode_srgb, encode_srgb
 
 Picture = NDArray[np.uint8]
 

@@ -66,8 +66,8 @@ def read_scene(path: str | PathLike[str]) -> SceneFile:
 
     Polygons are cut into triangles, transforms of a GLB's nodes are applied (mirrored ones turn
     their triangles over), vertices without a face are left out. Degenerate faces stay: repeated
-    corners and faces without area are for `pipelines.mesh_repair`. Textures, texture coordinates
-    and colours of vertices are ignored; a note says where textures are.
+    corners and faces without area are for `pipelines.geometry.repair`. Textures, texture
+    coordinates and colours of vertices are ignored; a note says where textures are.
 
     GLB: a part is what has one material. The diffuse albedo is the baseColorFactor, linear
     already, times (1 - metallicFactor); F0 goes from 0.04 to the mean base colour with the

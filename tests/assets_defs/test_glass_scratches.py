@@ -13,9 +13,13 @@ import pytest
 from assets_defs.glass_scratches import SCRATCHES
 from assets_defs.launcher import Request
 from assets_defs.system import Source
-from pipelines import colour, solids
-from pipelines.glass_scratches import frames, layers, profiles, sampling, tables
-from pipelines.glass_scratches.exact_table import equation_1, leaving_share
+from pipelines.drawing import colour
+from pipelines.geometry import solids
+from pipelines.glass_scratches.drawing import frames
+from pipelines.glass_scratches.layers import scratch_layers as layers
+from pipelines.glass_scratches.tables import profiles, sampling
+from pipelines.glass_scratches.tables import scratch_table as tables
+from pipelines.glass_scratches.tables.exact import equation_1, leaving_share
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SETTING = {"setting": "setting-2"}

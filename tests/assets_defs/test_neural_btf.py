@@ -15,15 +15,10 @@ from assets_defs.launcher import LaunchError, Request
 from assets_defs.neural_btf import BTF
 from assets_defs.neural_btf import network as network_assets
 from assets_defs.neural_btf.datasets import payload_bytes
-from pipelines import clustering, directions, lowrank
-from pipelines.neural_btf import (
-    abrdf,
-    compressed,
-    gonioreflectometer,
-    panel,
-    representatives,
-    training,
-)
+from pipelines import clustering, lowrank
+from pipelines.light import directions
+from pipelines.neural_btf import abrdf, compressed, panel, representatives, training
+from pipelines.virtual.cloth import gonioreflectometer
 from tests.assets_defs.regressions import Regression, assert_check_finds, materialise
 from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
 

@@ -10,8 +10,9 @@ import pytest
 
 from assets_defs.launcher import LaunchError, Request
 from assets_defs.photo_fur import FUR
-from pipelines import geometry
-from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells, virtual_pelt
+from pipelines.geometry import shapes
+from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells
+from pipelines.virtual.pelt import pelt as virtual_pelt
 from storage.versions import Slot
 from tests.assets_defs.regressions import Regression, assert_found
 
@@ -96,7 +97,7 @@ def _doubled_masks(right: Callable[..., Any], layer: Any, layers: int) -> Any:
 
 def _stretched_teapot(right: Callable[..., Any], segments: int) -> Any:
     mesh = right(segments)
-    return geometry.Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
+    return shapes.Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
 
 
 def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
@@ -141,7 +142,7 @@ REGRESSIONS = (
         lambda right, thickness, layers: right(thickness, layers) ** 2 / thickness,
         KEYS,
     ),
-    Regression("texture_stretch", geometry, "teapot", _stretched_teapot, PELT_KEYS),
+    Regression("texture_stretch", shapes, "teapot", _stretched_teapot, PELT_KEYS),
     Regression("top_view_rmse", drawing, "depth_code", _half_dropped, KEYS),
     Regression("least_coverage", drawing, "depth_code", _dropped, KEYS),
     Regression(

@@ -14,21 +14,20 @@ import pytest
 from assets_defs.launcher import Request
 from assets_defs.ssdf_lighting import SSDF
 from assets_defs.system import Source
-from pipelines import geometry, lowrank
-from pipelines.ssdf_lighting import (
-    compact,
-    decoding,
-    environment_fit,
-    figures,
-    frames,
-    refined,
-    scene,
-    triangle_clusters,
-    visibility,
+from pipelines import lowrank
+from pipelines.geometry import shapes
+from pipelines.ssdf_lighting import figures, scene
+from pipelines.ssdf_lighting.compression import compact, decoding, triangle_clusters
+from pipelines.ssdf_lighting.compression.compact_file import from_bytes
+from pipelines.ssdf_lighting.compression.compact_memory import (
+    cluster_bases,
+    packed,
+    vertex_distances,
 )
-from pipelines.ssdf_lighting.compact_file import from_bytes
-from pipelines.ssdf_lighting.compact_memory import cluster_bases, packed, vertex_distances
-from pipelines.ssdf_lighting.spherical_gaussians import rotated
+from pipelines.ssdf_lighting.distances import refined, visibility
+from pipelines.ssdf_lighting.drawing import frames
+from pipelines.ssdf_lighting.light import environment_fit
+from pipelines.ssdf_lighting.light.spherical_gaussians import rotated
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SCENE = {"scene": "teapot"}
@@ -101,7 +100,7 @@ def test_the_overview_lays_environments_side_by_side(good: Any) -> None:
 
 def _write_scene(path: Path, *, scale: float = 1.0, shift: float = 0.0) -> None:
     """A ball over a ground, in two materials; one triangle twice, one turned, one without area."""
-    ball, ground = geometry.sphere(12), geometry.square(8)
+    ball, ground = shapes.sphere(12), shapes.square(8)
     points = np.concatenate([ball.vertices * 0.4 + [0, 0, 0.5], ground.vertices * 4.0])
     points = points * scale + shift
     faces = np.concatenate([ball.triangles, ground.triangles + len(ball.vertices)]) + 1

@@ -15,22 +15,12 @@ from assets_defs.launcher import Request
 from assets_defs.street_billboards import STREET
 from assets_defs.street_billboards.datasets import compressed_of, pages_of, views_of
 from assets_defs.system import Source
-from pipelines.street_billboards import (
-    atlases,
-    billboards,
-    culling,
-    eigen_textures,
-    exposure,
-    figures,
-    frames,
-    octree,
-    point_fusion,
-    simulated_drive,
-    stage_view,
-    stereo,
-    view_textures,
-)
-from pipelines.street_billboards.textures import SEEN
+from pipelines.street_billboards import billboards, figures, octree
+from pipelines.street_billboards.capture import exposure, point_fusion, stereo
+from pipelines.street_billboards.drawing import culling, frames, stage_view
+from pipelines.street_billboards.textures import atlases, eigen_textures, view_textures
+from pipelines.street_billboards.textures.forms import SEEN
+from pipelines.virtual.city import simulated_drive
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 KEYS = {"drive": "city"}

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.microfacets import Materials
-from pipelines.ssdf_lighting.spherical_gaussians import Lights, evaluate
-from pipelines.stage import Camera
+from pipelines.drawing.stage import Camera
+from pipelines.ssdf_lighting.light.microfacets import Materials
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.glass_scratches.profiles import Shape, built_in_profile
+from pipelines.glass_scratches.tables.profiles import Shape, built_in_profile
 from tests.reference.groove import (
     ALBEDO,
     DEPTH,

@@ -12,13 +12,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from pipelines.geometry import Mesh, sphere, square
-from pipelines.raycasting import build_scene, first_hits
-from pipelines.ssdf_lighting.camera_rays import camera_rays, pixel_middles
-from pipelines.ssdf_lighting.ray_traced import ray_traced
-from pipelines.ssdf_lighting.shading import Materials
-from pipelines.ssdf_lighting.spherical_gaussians import Lights, evaluate
-from pipelines.stage import orbit
+from pipelines.drawing.stage import orbit
+from pipelines.geometry.rays import build_scene, first_hits
+from pipelines.geometry.shapes import Mesh, sphere, square
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles
+from pipelines.ssdf_lighting.drawing.ray_traced import ray_traced
+from pipelines.ssdf_lighting.light.shading import Materials
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
 from tests.reference.lit_scene import Part, light_map, mitsuba, pictures
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from pipelines.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
+from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf import compressed as compressed_module
 from pipelines.neural_btf.compressed import CompressedBtf, restoration_errors
 from pipelines.neural_btf.figures import decoded_plainly

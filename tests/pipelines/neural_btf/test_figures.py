@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from pipelines.directions import Pairs, all_pairs, hemisphere_table
+from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
 from pipelines.neural_btf.figures import (
     DECODER_PARAMETERS,
     decoded_plainly,

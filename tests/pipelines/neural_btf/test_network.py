@@ -9,7 +9,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from pipelines.directions import all_pairs, hemisphere_table
+from pipelines.light.directions import all_pairs, hemisphere_table
 from pipelines.neural_btf.network import (
     HIDDEN,
     LATENTS,

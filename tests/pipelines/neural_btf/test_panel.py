@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.colour import decode_srgb
-from pipelines.directions import unit_vectors
+from pipelines.drawing.colour import decode_srgb
+from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.panel import (
     BACKGROUND,
     LIGHT_THETA,

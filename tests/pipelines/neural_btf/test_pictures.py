@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from pipelines.colour import to_8bit
-from pipelines.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
+from pipelines.drawing.colour import to_8bit
+from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf.pictures import (
     PAPER_PAIRS,
     cluster_map,

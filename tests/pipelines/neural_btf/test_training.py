@@ -12,7 +12,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from pipelines.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
+from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
 from pipelines.lowrank import principal_components
 from pipelines.neural_btf import training
 from pipelines.neural_btf.abrdf import columns, standardised, statistics, transposed

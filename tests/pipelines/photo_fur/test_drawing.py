@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.colour import luminance, to_8bit
+from pipelines.drawing.colour import luminance, to_8bit
+from pipelines.drawing.stage import Camera, Light, Stage, Wrap, orbit
 from pipelines.photo_fur.attenuation import (
     Attenuation,
     Tails,
@@ -29,7 +30,6 @@ from pipelines.photo_fur.frames import (
     top_view_error,
 )
 from pipelines.photo_fur.shells import shell_vertices
-from pipelines.stage import Camera, Light, Stage, Wrap, orbit
 
 FILLS: tuple[Fill, ...] = ("columns", "bands")
 THICKNESS = 0.1

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines import geometry
-from pipelines.raycasting import build_scene
-from pipelines.ssdf_lighting.distances import distances_to_arcs, distances_to_samples
+from pipelines.geometry import shapes
+from pipelines.geometry.rays import build_scene
+from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
+from pipelines.ssdf_lighting.distances.signed_distance import (
+    distances_to_arcs,
+    distances_to_samples,
+)
+from pipelines.ssdf_lighting.distances.visibility import RayOrigins, ray_origins, visible_directions
+from pipelines.ssdf_lighting.distances.visible_edge import visible_edge
 from pipelines.ssdf_lighting.figures import (
     all_pairs_distances,
     border_step,
@@ -19,9 +25,6 @@ from pipelines.ssdf_lighting.figures import (
     sampled_rows,
     visibility_error,
 )
-from pipelines.ssdf_lighting.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.visibility import RayOrigins, ray_origins, visible_directions
-from pipelines.ssdf_lighting.visible_edge import visible_edge
 
 N = 16
 WAYS = texel_directions(N)
@@ -55,8 +58,8 @@ def test_sampled_rows_are_runs_from_end_to_end(count: int, wanted: int) -> None:
 
 
 def test_visibility_is_tested_by_another_method_and_faults_are_found() -> None:
-    ball = geometry.sphere(10)
-    around = ball.vertices, ball.triangles, geometry.vertex_normals(ball.vertices, ball.triangles)
+    ball = shapes.sphere(10)
+    around = ball.vertices, ball.triangles, shapes.vertex_normals(ball.vertices, ball.triangles)
     rays = build_scene(ball.vertices, ball.triangles)
     origins = ray_origins(rays, *around)
     visible = visible_directions(rays, origins, WAYS)
@@ -113,7 +116,7 @@ def test_right_distances_have_no_error_and_one_fault_is_measured() -> None:
 
 def a_scene() -> tuple[Bools, NDArray[np.float32]]:
     """Refined distances below a square."""
-    flat = geometry.square(2)
+    flat = shapes.square(2)
     rays = build_scene(flat.vertices + np.array([0.1, 0.2, 0.4]), flat.triangles)
     origins = RayOrigins(np.float32([[0, 0, 0], [0.3, 0.1, 0.1]]), np.zeros(2, bool))
     visible = visible_directions(rays, origins, WAYS)

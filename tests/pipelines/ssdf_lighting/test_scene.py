@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines import geometry
-from pipelines.mesh_repair import connected, edges
-from pipelines.ssdf_lighting.microfacets import Materials, check_materials
+from pipelines.geometry import shapes
+from pipelines.geometry.repair import connected, edges
+from pipelines.ssdf_lighting.light.microfacets import Materials, check_materials
 from pipelines.ssdf_lighting.scene import (
     SCENES,
     Scene,
@@ -148,7 +148,7 @@ def test_other_scenes_are_refused() -> None:
 
 @pytest.mark.parametrize(("size", "away"), [(1.0, 0.0), (1e-4, 7.0), (5e4, -1e6)])
 def test_given_positions_can_be_had_back(size: float, away: float) -> None:
-    ball = geometry.sphere(8)
+    ball = shapes.sphere(8)
     given = ball.vertices * [size, size / 2, size / 3] + away
     scene = make_scene(given, ball.triangles, np.zeros(len(ball.triangles), int), ONE)
     check(scene)
@@ -160,7 +160,7 @@ def test_given_positions_can_be_had_back(size: float, away: float) -> None:
 
 
 def test_vertices_of_no_triangle_do_not_count() -> None:
-    ball = geometry.sphere(8)
+    ball = shapes.sphere(8)
     vertices = np.concatenate([ball.vertices, [[1e6, 0, 0]]])
     scene = make_scene(vertices, ball.triangles, np.zeros(len(ball.triangles), int), ONE)
     check(scene)
@@ -201,7 +201,7 @@ def test_drawn_vertices_have_one_material_and_make_the_same_triangles(court: Sce
 
 def two_colours() -> Scene:
     """A sphere in two halves, which share the vertices of a line."""
-    ball = geometry.sphere(8)
+    ball = shapes.sphere(8)
     right = (ball.vertices[ball.triangles].mean(axis=1)[:, 0] > 0).astype(int)
     scene = make_scene(ball.vertices, ball.triangles, right, TWO)
     drawn = split_by_part(scene)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.street_billboards.billboards import Billboards
-from pipelines.street_billboards.textures import SIDE, CompressedTextures
-from pipelines.street_billboards.view_directions import CIRCLE
+from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.view_directions import CIRCLE
 
 
 def random_textures(

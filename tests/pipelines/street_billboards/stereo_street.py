@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from open3d.t.geometry import RaycastingScene
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from pipelines.colour import decode_srgb, to_8bit
-from pipelines.raycasting import build_scene, first_hits
+from pipelines.drawing.colour import decode_srgb, to_8bit
+from pipelines.geometry.rays import build_scene, first_hits
 
 BASELINE = 0.8
 POLES = ((-3.6, 8.0), (3.3, 9.0), (-3.4, 12.0), (3.6, 14.5), (-3.7, 17.0), (3.5, 21.0))

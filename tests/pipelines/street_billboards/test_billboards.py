@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from pipelines.geometry.cameras import Cameras
 from pipelines.street_billboards.billboards import (
     OVERLAP,
     Billboards,
@@ -15,9 +16,8 @@ from pipelines.street_billboards.billboards import (
     plane_axes,
     turned_axes,
 )
-from pipelines.street_billboards.cameras import Cameras
 from pipelines.street_billboards.octree import octree_leaves
-from pipelines.street_billboards.view_directions import CIRCLE, DIRECTIONS, fan_position
+from pipelines.street_billboards.textures.view_directions import CIRCLE, DIRECTIONS, fan_position
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 SIDE = 0.5

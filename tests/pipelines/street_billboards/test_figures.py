@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.colour import encode_srgb
-from pipelines.street_billboards.cameras import points_at
+from pipelines.drawing.colour import encode_srgb
+from pipelines.geometry.cameras import points_at
+from pipelines.street_billboards.capture.stereo_figures import depth_error, stray_share
 from pipelines.street_billboards.figures import evened, likeness, near, psnr, psnr_of, squares
-from pipelines.street_billboards.stereo_figures import depth_error, stray_share
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 ALL = np.ones((24, 30), bool)

@@ -1,0 +1,1 @@
+"""The stage (PyVista offscreen), shaders, colour, plots, sheets of pictures."""

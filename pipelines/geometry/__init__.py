@@ -1,0 +1,1 @@
+"""Meshes and solids, their repair, rays (Embree), cameras."""

@@ -1,0 +1,1 @@
+"""Scratched glass, traced and on the stage."""

@@ -1,0 +1,126 @@
+"""Pictures of scratched glass: which views, by path tracing, and the same on the stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.drawing.colour import luminance, to_8bit
+from pipelines.drawing.stage import Camera, fitting_distance, orbit
+from pipelines.geometry.rays import build_scene, first_hits
+from pipelines.geometry.solids import Solid
+from pipelines.glass_scratches.drawing.path_tracing import Picture, Surface, trace
+from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw
+from pipelines.light.environments import Sampler, rotated, sampler, solid_angles, uniform
+
+_VIEW_ANGLE = 30.0
+_AZIMUTH, _ELEVATION = -68.0, 14.0
+_CLOSE_UP = 0.42
+"""Distance of the close view from the surface: a hand's breadth, where the radius is 1."""
+_CLOSE_AZIMUTH, _CLOSE_ELEVATION = -82.0, 8.0
+FURNACE_SIZE, FURNACE_SAMPLES = 48, 64
+
+
+class Frames(NamedTuple):
+    """``far`` and ``close`` as traced; ``stage`` (2, H, W, 3) float32: the same on the stage."""
+
+    far: Picture
+    close: Picture
+    stage: NDArray[np.float32]
+
+
+def cameras(solid: Solid) -> tuple[Camera, Camera]:
+    """The whole object, and its surface from a hand's breadth."""
+    middle = (0.0, 0.0, 0.0)
+    distance = 1.03 * fitting_distance(
+        solid.vertices, middle, _AZIMUTH, _ELEVATION, view_angle=_VIEW_ANGLE, aspect=1.0
+    )
+    far = orbit(middle, distance, _AZIMUTH, _ELEVATION, view_angle=_VIEW_ANGLE)
+    start = orbit(middle, distance, _CLOSE_AZIMUTH, _CLOSE_ELEVATION).position
+    scene = build_scene(solid.vertices, solid.triangles)
+    way = -np.array(start) / np.linalg.norm(start)
+    hit = first_hits(scene, np.array([start]), way).distance[0]
+    if not np.isfinite(hit):  # a ring: its hole lies in the middle
+        hit = np.float32(np.linalg.norm(start))
+    x, y, z = (np.array(start) + float(hit) * way).tolist()
+    close = orbit((x, y, z), _CLOSE_UP, _CLOSE_AZIMUTH, _CLOSE_ELEVATION, view_angle=_VIEW_ANGLE)
+    return far, close
+
+
+def exposure(light: Sampler) -> float:
+    """Factor that shows a white matt surface, lit evenly by all of the environment, as 0.35: equal
+    for all scratches in the same light."""
+    bright = luminance(light.radiance.astype(np.float64))
+    solid = solid_angles(len(bright))[:, None]
+    return 0.35 * 4 * np.pi / float(np.sum(bright * solid))
+
+
+def trace_frames(
+    solid: Solid,
+    surface: Surface,
+    actor: ScratchedActor,
+    light: Sampler,
+    *,
+    size: int,
+    samples: int,
+    seed: int,
+    progress: Callable[[float], None],
+) -> Frames:
+    """Both views, size x size pixels: ``samples`` paths a pixel, and by the shader."""
+    views = cameras(solid)
+    traced = [
+        trace(
+            solid,
+            surface,
+            light,
+            camera,
+            width=size,
+            height=size,
+            samples=samples,
+            seed=seed,
+            progress=lambda fraction, number=number: progress((number + fraction) / 2),  # type: ignore[misc]
+        )
+        for number, camera in enumerate(views)
+    ]
+    stage = [
+        draw(actor, light, camera, width=size, height=size, supersampling=2)[..., :3]
+        for camera in views
+    ]
+    return Frames(traced[0], traced[1], np.stack(stage))
+
+
+def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
+    """The far view in an environment of radiance 1: nowhere brighter than that."""
+    return trace(
+        solid,
+        surface,
+        sampler(uniform(8)),
+        cameras(solid)[0],
+        width=FURNACE_SIZE,
+        height=FURNACE_SIZE,
+        samples=FURNACE_SAMPLES,
+        seed=seed,
+    )
+
+
+def moving_light(
+    solid: Solid,
+    actor: ScratchedActor,
+    light: Sampler,
+    *,
+    count: int,
+    size: int,
+    progress: Callable[[float], None],
+) -> NDArray[np.uint8]:
+    """The close view on the stage while the light turns once around: (count, size, size, 3)."""
+    camera = cameras(solid)[1]
+    pictures = []
+    for number in range(count):
+        progress(number / count)
+        turned = sampler(rotated(light.radiance, 360.0 * number / count))
+        drawn = draw(actor, turned, camera, width=size, height=size, supersampling=2)
+        pictures.append(drawn[..., :3])
+    return to_8bit(np.stack(pictures) * exposure(light))

@@ -1,0 +1,1 @@
+"""Where scratches lie on a surface."""

@@ -1,0 +1,1 @@
+"""What a scratch's cross-section does to light."""

@@ -1,0 +1,174 @@
+"""The scratch BRDF in space: evaluate, sample, pdf, in the scratch's frame (u, v, n).
+
+Directions are unit vectors (along u, across v, normal n) that point away from the surface. The
+3-D BRDF (Fresnel's factor apart) is
+
+    f = (2 / pi²) rho_m(phi_o, phi_i) k(theta_o, theta_i)
+
+and f cos dω splits into [rho_m cos phi dphi / pi] [(2 / pi) k cos² theta dtheta]. Diffuse walls
+forget the lean along the scratch: k = 1. A mirror turns it over. In between the lean's quantile
+c(theta), uniform under cos², is blurred and folded like the bounces of the 2-D paths, so k is
+symmetric and its mean is one for every roughness.
+
+The view's phi is taken at the nearest bin; inside the light's bin the sine of phi is uniform. So
+evaluate, sample and pdf agree exactly.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
+from pipelines.glass_scratches.tables.monte_carlo import blur_of
+
+_LEAST_BLUR = 0.01
+"""Of the lean of a mirror: lobes of half a degree can still be evaluated."""
+
+
+class Lobe(NamedTuple):
+    """What the kernels need of a table.
+
+    ``rho`` (places, M, M) float32; ``cdf`` (places, M, M + 1) float32 over the light's bins, from
+    0 to 1; ``share`` (places, M) float32: part of the light that leaves; ``sines`` (M + 1,) of the
+    bins' borders; ``blur`` of the lean's quantile, infinite where k = 1.
+    """
+
+    rho: NDArray[np.float32]
+    cdf: NDArray[np.float32]
+    share: NDArray[np.float32]
+    sines: NDArray[np.float64]
+    blur: float
+
+
+def make_lobe(across: NDArray[np.float32], roughness: float) -> Lobe:
+    """The lobe of a table's ``across`` (places, M, M)."""
+    bins = across.shape[1]
+    part = across.astype(np.float64) * bin_weights(bins) / np.pi
+    share = part.sum(axis=-1)
+    running = np.cumsum(part, axis=-1) / np.where(share > 0, share, 1.0)[..., None]
+    cdf = np.concatenate([np.zeros((*share.shape, 1)), running], axis=-1)
+    cdf[..., -1] = 1.0
+    return lobe_of(across, cdf.astype(np.float32), share.astype(np.float32), roughness)
+
+
+def lobe_of(
+    across: NDArray[np.float32],
+    cdf: NDArray[np.float32],
+    share: NDArray[np.float32],
+    roughness: float,
+) -> Lobe:
+    """A lobe whose sums were made before. Raises ValueError for a roughness outside [0, 1]."""
+    # Half: the quantile runs over (0, 1), the bounce's sine over (-1, 1).
+    blur = max(blur_of(roughness) / 2, _LEAST_BLUR)
+    return Lobe(across, cdf, share, np.sin(bin_edges(across.shape[1])), float(blur))
+
+
+@njit(cache=True, inline="always")
+def bin_of(v, n, bins):  # type: ignore[no-untyped-def]
+    """The bin of a direction's phi."""
+    angle = np.arctan2(v, max(n, 0.0))
+    return min(max(int((angle / np.pi + 0.5) * bins), 0), bins - 1)
+
+
+@njit(cache=True)
+def quantile(u):  # type: ignore[no-untyped-def]
+    """Share of cos² theta below the lean whose sine is u."""
+    s = min(max(u, -1.0), 1.0)
+    return 0.5 + (np.arcsin(s) + s * np.sqrt(1.0 - s * s)) / np.pi
+
+
+@njit(cache=True)
+def lean_sine(c):  # type: ignore[no-untyped-def]
+    """The sine whose quantile is c: Newton's method on the angle, held inside by bisection."""
+    low, high = -np.pi / 2, np.pi / 2
+    theta = np.pi * (c - 0.5) / 2
+    for _ in range(60):
+        excess = theta + np.sin(theta) * np.cos(theta) - np.pi * (c - 0.5)
+        if abs(excess) < 1e-13:
+            break
+        if excess > 0:
+            high = theta
+        else:
+            low = theta
+        slope = 2.0 * np.cos(theta) ** 2
+        step = theta - excess / slope if slope > 1e-12 else low
+        theta = step if low < step < high else (low + high) / 2
+    return np.sin(theta)
+
+
+@njit(cache=True)
+def lean_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
+    """k as a density over the light's quantile, for the view's."""
+    if np.isinf(blur):
+        return 1.0
+    mirrored = 1.0 - c_view
+    total = 0.0
+    if blur > 0.4:  # the heat kernel by its cosines …
+        total = 1.0
+        for k in range(1, 12):
+            term = np.exp(-0.5 * (np.pi * k * blur) ** 2)
+            total += 2.0 * term * np.cos(np.pi * k * mirrored) * np.cos(np.pi * k * c_light)
+            if term < 1e-17:
+                break
+        return total
+    for fold in range(-2, 3):  # … or by images
+        for sign in (-1.0, 1.0):
+            z = (sign * c_light + 2.0 * fold - mirrored) / blur
+            total += np.exp(-0.5 * z * z)
+    return total / (blur * np.sqrt(2.0 * np.pi))
+
+
+@njit(cache=True)
+def evaluate(rho, blur, place, ou, ov, on, iu, iv, i_n):  # type: ignore[no-untyped-def]
+    """f of view o and light i, 1/sr; 0 below the surface."""
+    if on <= 0.0 or i_n <= 0.0:
+        return 0.0
+    bins = rho.shape[1]
+    table = rho[place, bin_of(ov, on, bins), bin_of(iv, i_n, bins)]
+    return 2.0 / np.pi**2 * table * lean_kernel(quantile(ou), quantile(iu), blur)
+
+
+@njit(cache=True)
+def pdf(rho, share, blur, place, ou, ov, on, iu, iv, i_n):  # type: ignore[no-untyped-def]
+    """Density per steradian with which :func:`sample` returns the light i."""
+    if on <= 0.0 or i_n <= 0.0:
+        return 0.0
+    kept = share[place, bin_of(ov, on, rho.shape[1])]
+    if kept <= 0.0:
+        return 0.0
+    return evaluate(rho, blur, place, ou, ov, on, iu, iv, i_n) * i_n / kept
+
+
+@njit(cache=True)
+def sample(cdf, sines, blur, place, ou, ov, on, u1, u2, u3):  # type: ignore[no-untyped-def]
+    """A light (u, v, n) for the view o, from numbers u1, u2, u3 in [0, 1), u3 only where k = 1.
+
+    Its weight f cos / pdf is ``share``: by Eq. 5 all that is left to look up is the light.
+    """
+    bins = cdf.shape[1]
+    row = cdf[place, bin_of(ov, on, bins)]
+    low, high = 0, bins
+    while high - low > 1:
+        middle = (low + high) // 2
+        if row[middle] <= u1:
+            low = middle
+        else:
+            high = middle
+    width = row[low + 1] - row[low]
+    inside = min(max((u1 - row[low]) / width, 0.0), 1.0) if width > 0 else 0.5
+    sine = sines[low] + inside * (sines[low + 1] - sines[low])
+    if np.isinf(blur):
+        along = np.sqrt(u2) * np.cos(2.0 * np.pi * u3)  # the semicircle's law
+    else:
+        normal = np.sqrt(-2.0 * np.log(1.0 - u2)) * np.cos(2.0 * np.pi * u3)
+        c = 1.0 - quantile(ou) + blur * normal
+        c = np.fmod(c, 2.0)
+        if c < 0.0:
+            c += 2.0
+        along = lean_sine(2.0 - c if c > 1.0 else c)
+    rest = np.sqrt(max(1.0 - along * along, 0.0))
+    return along, rest * sine, rest * np.sqrt(max(1.0 - sine * sine, 0.0))

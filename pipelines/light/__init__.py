@@ -1,0 +1,1 @@
+"""Directions, and maps of light around a scene."""

@@ -1,0 +1,1 @@
+"""Distance functions made small: as a file and in memory."""

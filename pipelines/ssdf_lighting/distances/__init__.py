@@ -1,0 +1,1 @@
+"""How far each direction is from the edge of what a vertex sees."""

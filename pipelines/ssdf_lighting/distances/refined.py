@@ -1,0 +1,119 @@
+"""Distances to the refined edge of visibility, small holes included.
+
+Directions miss what is smaller than their texels: a gap between two surfaces, or between facets at
+the surface's own horizon, through which a little sky shows. That is rare, but distances are then
+wrong over a wide dark region. So inside dark regions every texel is asked again, at four places; a
+place that sees the sky gets a small loop of its own. (Thin stems before the sky are missed the same
+way. To ask all bright texels again, too, took a third more time and gained next to nothing on the
+teapot.)
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.geometry.rays import occluded
+from pipelines.ssdf_lighting.distances.octahedral import directions_of, square_of, texel_directions
+from pipelines.ssdf_lighting.distances.signed_distance import distances_to_arcs
+from pipelines.ssdf_lighting.distances.visibility import RayOrigins
+from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, delaunay_sides, visible_edge
+
+if TYPE_CHECKING:
+    from open3d.t.geometry import RaycastingScene
+
+_BELOW = 0.2
+"""Sine of the angle below the tangent plane down to which facets may leave a view."""
+_LOOP = 0.2
+"""Radius of the loop around a hole, in sides of a texel."""
+
+
+def refined_distances(
+    scene: RaycastingScene,
+    origins: RayOrigins,
+    normals: NDArray[np.floating],
+    visible: NDArray[np.bool_],
+) -> NDArray[np.float32]:
+    """d (P, n²) float32, radians, of P points whose ``visible`` (P, n²) is known.
+
+    ``normals`` (P, 3): far below the surface's own horizon no holes are looked for. The signs are
+    those of ``visible``.
+    """
+    edge = visible_edge(scene, origins.points, visible)
+    point, way = _holes(scene, origins, normals, visible)
+    return distances_to_arcs(visible, _with_loops(edge, point, way, visible.shape[1]))
+
+
+@functools.lru_cache(maxsize=4)
+def _quarters(n: int) -> NDArray[np.float32]:
+    """Unit vectors (n², 4, 3) to the middles of the texels' quarters."""
+    middles = square_of(texel_directions(n))
+    steps = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) * (0.5 / n)
+    return directions_of(middles[:, None] + steps).astype(np.float32)
+
+
+def _holes(
+    scene: RaycastingScene,
+    origins: RayOrigins,
+    normals: NDArray[np.floating],
+    visible: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Points (H,), ascending, and directions (H, 3) that see the sky where all around is hidden."""
+    n = round(visible.shape[1] ** 0.5)
+    inner = _inner(visible, delaunay_sides(n).ends) & ~visible
+    inner &= normals @ texel_directions(n).T > -_BELOW
+    inner &= ~origins.sealed[:, None]
+    point, texel = np.nonzero(inner)
+    ways = _quarters(n)[texel].reshape(-1, 3)
+    point = np.repeat(point, 4)
+    seen = ~occluded(scene, origins.points[point], ways)
+    return point[seen], ways[seen]
+
+
+@njit(cache=True, nogil=True)
+def _inner(visible: NDArray[np.bool_], ends: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Directions (P, D) all of whose Delaunay neighbours have the same visibility."""
+    inner = np.ones(visible.shape, np.bool_)
+    for p in range(len(visible)):
+        for side in range(len(ends)):
+            first, second = ends[side]
+            if visible[p, first] != visible[p, second]:
+                inner[p, first] = False
+                inner[p, second] = False
+    return inner
+
+
+def _with_loops(
+    edge: VisibleEdge, point: NDArray[np.int64], way: NDArray[np.float32], directions: int
+) -> VisibleEdge:
+    """The edge with a loop of three arcs around each way (H, 3) of a point (H,)."""
+    if not len(point):
+        return edge
+    radius = _LOOP * np.sqrt(4.0 * np.pi / directions)
+    upright = np.where(np.abs(way[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    one = np.cross(way, upright)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    other = np.cross(way, one)
+    angles = np.arange(3) * (2.0 * np.pi / 3.0)
+    around = np.cos(angles)[:, None] * one[:, None] + np.sin(angles)[:, None] * other[:, None]
+    corners = way[:, None] + radius * around
+    corners /= np.linalg.norm(corners, axis=2, keepdims=True)
+    added = 3 * np.bincount(point, minlength=len(edge.starts) - 1)
+    shift = np.concatenate([[0], np.cumsum(added)])
+    starts = edge.starts + shift
+    # Where the old and the new ones of each point go: the old ones first.
+    owner = np.repeat(np.arange(len(added)), np.diff(edge.starts))
+    old = np.arange(len(edge.crossings)) + shift[owner]
+    place = np.repeat(3 * (np.arange(len(point)) - np.searchsorted(point, point)), 3)
+    new = (starts[1:] - added)[np.repeat(point, 3)] + place + np.tile(np.arange(3), len(point))
+    crossings = np.empty((starts[-1], 3), np.float32)
+    arcs = np.empty((starts[-1], 2), np.int32)
+    crossings[old], crossings[new] = edge.crossings, corners.reshape(-1, 3)
+    arcs[old] = edge.arcs + shift[owner][:, None]
+    arcs[new, 0] = new
+    arcs[new, 1] = new.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    return VisibleEdge(crossings, arcs, starts)

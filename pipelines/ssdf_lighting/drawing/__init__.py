@@ -1,0 +1,1 @@
+"""Lit scenes, traced and on the stage."""

@@ -1,0 +1,159 @@
+"""Pictures of a lit scene: turning light, the same not compressed, the same traced with rays."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.stage import PAINTED, Camera, Stage, fitting_distance, orbit, surface
+from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
+from pipelines.ssdf_lighting.drawing.ray_traced import Traced, ray_traced
+from pipelines.ssdf_lighting.drawing.stage_view import LitActor
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated
+from pipelines.ssdf_lighting.scene import Scene, split_by_part
+
+Progress = Callable[[float], None]
+LookUp = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
+"""Vertices (P,) and axes (P, L, 3) -> d (P, L), radians."""
+
+VIEW_ANGLE = 30.0
+_BACKGROUND = (0.02, 0.02, 0.025)
+
+
+class Turn(NamedTuple):
+    """The scene under turning light. radiance: (frames, H, W, 3) float32; covered: (H, W) float32;
+    seconds: (frames,) of each, the first with building the shaders; renderer: its name."""
+
+    radiance: NDArray[np.float32]
+    covered: NDArray[np.float32]
+    seconds: NDArray[np.float64]
+    renderer: str
+
+
+def scene_camera(scene: Scene, azimuth: float, elevation: float, aspect: float) -> Camera:
+    """A camera on an orbit, so near that all that stands on the floor just fits in; degrees.
+
+    The floor is taken to be what lies lowest: a twentieth of the scene's height.
+    """
+    height = np.ptp(scene.vertices[:, 2])
+    raised = scene.vertices[scene.vertices[:, 2] > scene.vertices[:, 2].min() + 0.05 * height]
+    shown = raised if len(raised) else scene.vertices
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    x, y, z = (low + high) / 2.0
+    target = (float(x), float(y), float(z))
+    box = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), -1).reshape(-1, 3)
+    distance = fitting_distance(
+        box, target, azimuth, elevation, view_angle=VIEW_ANGLE, aspect=aspect
+    )
+    return orbit(target, 1.25 * distance, azimuth, elevation, view_angle=VIEW_ANGLE)
+
+
+def turning(
+    scene: Scene,
+    lights: Lights,
+    look_up: LookUp,
+    camera: Camera,
+    size: tuple[int, int],
+    turns: Sequence[float],
+    progress: Progress = lambda fraction: None,
+    *,
+    supersampling: int = 1,
+) -> Turn:
+    """Draw the scene for each turn (degrees about up) of its lights.
+
+    ``look_up`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
+    """
+    drawn = split_by_part(scene)
+    actor = LitActor(
+        scene.vertices[drawn.source],
+        drawn.triangles,
+        scene.normals[drawn.source],
+        drawn.part,
+        scene.materials,
+        lights,
+    )
+    pictures, seconds = [], []
+    with Stage(*size, background=_BACKGROUND, supersampling=supersampling) as stage:
+        stage.add(*actor.actors)
+        stage.look(camera)
+        for number, turn in enumerate(turns):
+            begin = time.perf_counter()
+            actor.relight(camera, rotated(lights, turn), lambda axes: look_up(drawn.source, axes))
+            stage.draw()
+            seconds.append(time.perf_counter() - begin)
+            pictures.append(stage.radiance())
+            progress((number + 1) / len(turns))
+        renderer = stage.renderer_name
+    frames = np.stack(pictures)
+    return Turn(frames[..., :3], frames[0, ..., 3], np.array(seconds), renderer)
+
+
+def traced(
+    scene: Scene,
+    lights: Lights,
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int,
+    *,
+    seed: int = 0,
+    progress: Progress = lambda fraction: None,
+) -> Traced:
+    """The same picture by rays towards the same lights, none of the method's shortcuts."""
+    return ray_traced(
+        scene.vertices,
+        scene.triangles,
+        scene.normals,
+        scene.part,
+        scene.materials,
+        lights,
+        camera,
+        size,
+        samples,
+        seed,
+        progress,
+        jittered=False,
+    )
+
+
+def cluster_picture(
+    scene: Scene, cluster: NDArray[np.integer], camera: Camera, size: tuple[int, int]
+) -> NDArray[np.uint8]:
+    """Triangles in the colours of their clusters (figure 2)."""
+    colours = cluster_colours(int(cluster.max()) + 1)
+    corners = scene.vertices[scene.triangles].reshape(-1, 3)
+    normals = scene.normals[scene.triangles].reshape(-1, 3)
+    light = np.maximum(normals @ (np.array([0.3, -0.4, 0.85]) / 0.986), 0.0) * 0.6 + 0.4
+    painted = surface(
+        corners,
+        np.arange(len(corners)).reshape(-1, 3),
+        attributes={"shown": np.repeat(colours[cluster], 3, axis=0) * light[:, None]},
+        shader=PAINTED,
+        lit=False,
+    )
+    with Stage(*size, background=_BACKGROUND, supersampling=2) as stage:
+        stage.add(painted)
+        stage.look(camera)
+        return stage.frame()
+
+
+def psnr(
+    picture: NDArray[np.uint8], reference: NDArray[np.uint8], shown: NDArray[np.bool_]
+) -> float:
+    """Peak signal to noise ratio (dB) of 8-bit pictures (H, W, 3) over the pixels ``shown``."""
+    difference = picture[shown].astype(np.float64) - reference[shown]
+    return float(10.0 * np.log10(255.0**2 / max((difference**2).mean(), 1e-12)))
+
+
+def exposed(radiance: NDArray[np.floating], scale: float) -> NDArray[np.uint8]:
+    """Radiance as an 8-bit sRGB picture."""
+    return to_8bit(radiance * scale)
+
+
+def scene_exposure(turn: Turn) -> float:
+    """Factor that brings the brighter part of the scene's pixels, of all frames, to 0.8."""
+    return exposure(turn.radiance[:, turn.covered > 0.5])

@@ -1,0 +1,254 @@
+"""Ground truth of the shading: the same lights and materials, visibility by rays.
+
+Direct light only, as the shading has it. Directions are drawn from all lights, from the cosine and
+from Beckmann's half vectors at once, and weighted by the sum of these densities (Veach's balance
+heuristic, one sample at a time): no sample is much brighter than the pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipelines.drawing.stage import Camera
+from pipelines.geometry.rays import build_scene, first_hits, occluded
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles
+from pipelines.ssdf_lighting.light.microfacets import Materials, beckmann, check_materials, gloss
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
+
+if TYPE_CHECKING:
+    from open3d.t.geometry import RaycastingScene
+
+FloatArray = NDArray[np.float64]
+
+_OFF_SURFACE = 1e-4  # of the triangle's size
+_LIGHTS_PART = 0.5  # of the samples
+_LEAST_FACING = 0.02
+_AT_ONCE = 1 << 17  # samples in memory together
+
+
+class Traced(NamedTuple):
+    """radiance: (H, W, 4) float64, linear, and coverage; standard_error: (H, W, 3) of radiance, as
+    if samples were independent; they are spread evenly, and it is less."""
+
+    radiance: FloatArray
+    standard_error: FloatArray
+
+
+class _Surface(NamedTuple):
+    points: FloatArray
+    triangles: NDArray[np.integer]
+    normals: FloatArray
+    object_of_triangle: NDArray[np.integer]
+    facing: FloatArray
+    """(F, 3) geometric unit normals, on the side of the shading normals."""
+    off: FloatArray
+    """(F,) how far rays start above the triangle."""
+
+
+class _Spots(NamedTuple):
+    """Where S samples hit the surface. ``facing`` is the geometric normal; all (S, 3) but ``row``
+    (S,), the material's."""
+
+    at: FloatArray
+    normal: FloatArray
+    facing: FloatArray
+    view: FloatArray
+    row: NDArray[np.integer]
+
+
+def ray_traced(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    normals: ArrayLike,
+    object_of_triangle: ArrayLike,
+    materials: Materials,
+    lights: Lights,
+    camera: Camera,
+    size: tuple[int, int],
+    samples: int,
+    seed: int,
+    progress: Callable[[float], None],
+    *,
+    jittered: bool = True,
+) -> Traced:
+    """Trace a picture of ``size`` = (width, height) with ``samples`` >= 2 a pixel.
+
+    vertices, normals: (V, 3), normals of length 1, interpolated; triangles: (F, 3).
+    object_of_triangle: (F,) rows of ``materials``.
+    progress: is told the share of the work that is done.
+    jittered: samples are spread evenly over the pixel; else all go through its middle, as the
+        stage's do.
+
+    Light from below the triangle or its shading normal does not arrive. Raises ValueError as
+    ``build_scene`` and for materials that are none.
+    """
+    check_materials(materials)
+    scene = build_scene(vertices, triangles)
+    surface = _surface(vertices, triangles, normals, object_of_triangle)
+    middles = pixel_middles(size)
+    picture, error = np.zeros((len(middles), 4)), np.zeros((len(middles), 3))
+    rows = max(1, _AT_ONCE // samples)
+    for first in range(0, len(middles), rows):
+        progress(first / len(middles))
+        block = slice(first, first + rows)
+        places = np.repeat(middles[block], samples, axis=0)
+        # Each block has numbers of its own: the picture does not depend on the blocks' order.
+        rng = np.random.default_rng([seed, first])
+        u = _spread(len(middles[block]), samples, rng)
+        if jittered:
+            places += u[:, 4:] - 0.5
+        light, hit = _sampled(scene, surface, materials, lights, camera, size, places, u[:, :4])
+        light = light.reshape(-1, samples, 3)
+        picture[block, :3] = light.mean(axis=1)
+        picture[block, 3] = hit.reshape(-1, samples).mean(axis=1)
+        error[block] = light.std(axis=1, ddof=1) / math.sqrt(samples)
+    width, height = size
+    return Traced(picture.reshape(height, width, 4), error.reshape(height, width, 3))
+
+
+def _spread(pixels: int, samples: int, rng: np.random.Generator) -> FloatArray:
+    """Numbers (pixels * samples, 6) in [0, 1): in each pixel Sobol's points, moved around."""
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(6, scramble=True, rng=rng).random(1 << (samples - 1).bit_length())[:samples]
+    return ((points + rng.random((pixels, 1, 6))) % 1.0).reshape(-1, 6)
+
+
+def _surface(
+    vertices: ArrayLike, triangles: ArrayLike, normals: ArrayLike, object_of_triangle: ArrayLike
+) -> _Surface:
+    points, corners = np.asarray(vertices, np.float64), np.asarray(triangles)
+    shading = np.asarray(normals, np.float64)
+    a, b, c = np.moveaxis(points[corners], 1, 0)
+    facing = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(facing, axis=1, keepdims=True)
+    facing = facing / np.maximum(doubled, 1e-300)
+    facing = np.where(
+        np.sum(facing * shading[corners].sum(axis=1), axis=1, keepdims=True) < 0, -facing, facing
+    )
+    return _Surface(
+        points,
+        corners,
+        shading,
+        np.asarray(object_of_triangle),
+        facing,
+        _OFF_SURFACE * np.sqrt(doubled[:, 0]),
+    )
+
+
+def _sampled(
+    scene: RaycastingScene,
+    surface: _Surface,
+    materials: Materials,
+    lights: Lights,
+    camera: Camera,
+    size: tuple[int, int],
+    places: FloatArray,
+    u: FloatArray,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """One sample's light (S, 3) for each place (S, 2) of the picture, and whether it hit;
+    ``u`` (S, 4) are its numbers in [0, 1)."""
+    origins, ways = camera_rays(camera, size, places)
+    hits = first_hits(scene, origins, ways)
+    hit = hits.triangle >= 0
+    light = np.zeros((len(places), 3))
+    if not hit.any():
+        return light, hit
+    triangle, weight = hits.triangle[hit], hits.barycentric[hit].astype(np.float64)
+    corner = surface.triangles[triangle]
+    facing = surface.facing[triangle]
+    at = np.einsum("sk,skc->sc", weight, surface.points[corner])
+    spots = _Spots(
+        at + facing * surface.off[triangle][:, None],
+        _unit(np.einsum("sk,skc->sc", weight, surface.normals[corner])),
+        facing,
+        -ways[hit],
+        surface.object_of_triangle[triangle],
+    )
+    way, density, glow = _drawn(spots, materials, lights, u[hit])
+    reflected = _reflected(spots, materials, way)
+    above = (np.sum(way * spots.facing, axis=1) > 0) & (reflected > 0).any(axis=1)
+    above[above] = ~occluded(scene, spots.at[above], way[above])
+    light[hit] = np.where(above[:, None], glow * reflected / density[:, None], 0.0)
+    return light, hit
+
+
+def _drawn(
+    spots: _Spots, materials: Materials, lights: Lights, u: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Directions (S, 3), their density (S,) per steradian, and the radiance (S, 3) from there."""
+    roughness = materials.roughness[spots.row]
+    gloss_part = np.where(materials.specular[spots.row] > 0, (1 - _LIGHTS_PART) / 2, 0.0)
+    matt_part = 1 - _LIGHTS_PART - gloss_part
+    whole = integral(lights.sharpness)
+    # Lights that are below the horizon by their own width are hardly worth a sample.
+    width = np.minimum(1.5 / np.sqrt(lights.sharpness), 1.0)
+    facing = np.maximum((spots.normal @ lights.axes.T + width) / (1 + width), _LEAST_FACING)
+    chances = facing * (lights.amplitudes.mean(axis=1) * whole + 1e-30)
+    chances /= chances.sum(axis=1, keepdims=True)
+
+    chosen = np.sum(np.cumsum(chances, axis=1) < u[:, 3:], axis=1)
+    chosen = np.minimum(chosen, len(whole) - 1)
+    by_light = u[:, 2] < _LIGHTS_PART
+    by_gloss = u[:, 2] >= 1 - gloss_part
+    sharp = lights.sharpness[chosen]
+    around_light = 1 + np.log1p(u[:, 0] * np.expm1(-2 * sharp)) / sharp
+    slope = roughness * np.sqrt(-np.log1p(-u[:, 0]))
+    cosine = np.where(
+        by_light, around_light, np.where(by_gloss, 1 / np.hypot(1, slope), np.sqrt(u[:, 0]))
+    )
+    pole = np.where(by_light[:, None], lights.axes[chosen], spots.normal)
+    way = _about(pole, cosine, 2 * math.pi * u[:, 1])
+    o_h = np.sum(way * spots.view, axis=1, keepdims=True)
+    way = np.where(by_gloss[:, None], 2 * o_h * way - spots.view, way)
+
+    lobes = np.exp(lights.sharpness * (way @ lights.axes.T - 1))
+    half = _unit(way + spots.view)
+    n_h, o_h = (np.sum(half * other, axis=1) for other in (spots.normal, spots.view))
+    n_i = np.sum(way * spots.normal, axis=1)
+    mirrored = np.where(n_h > 0, beckmann(n_h, roughness) * n_h / (4 * np.maximum(o_h, 1e-6)), 0.0)
+    density = (
+        _LIGHTS_PART * np.sum(chances / whole * lobes, axis=1)
+        + matt_part * np.maximum(n_i, 0) / math.pi
+        + gloss_part * mirrored
+    )
+    return way, density, lobes @ lights.amplitudes
+
+
+def _reflected(spots: _Spots, materials: Materials, way: FloatArray) -> FloatArray:
+    """BRDF times cosine (S, 3)."""
+    half = _unit(way + spots.view)
+    n_i = np.sum(way * spots.normal, axis=1)
+    shine = gloss(
+        n_i,
+        np.sum(spots.view * spots.normal, axis=1),
+        np.sum(half * spots.normal, axis=1),
+        np.sum(half * spots.view, axis=1),
+        materials.specular[spots.row],
+        materials.roughness[spots.row],
+    )
+    matt = materials.albedo[spots.row] / math.pi * np.maximum(n_i, 0.0)[:, None]
+    return matt + shine[:, None]
+
+
+def _about(pole: FloatArray, cosine: FloatArray, azimuth: FloatArray) -> FloatArray:
+    """Unit vectors (S, 3) at these angles to poles (S, 3); Duff et al. 2017's tangents."""
+    x, y, z = pole.T
+    sign = np.copysign(1.0, z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    one = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    other = np.stack([b, sign + y * y * a, -y], axis=1)
+    sine = np.sqrt(np.maximum(1 - cosine**2, 0.0))
+    along, across = sine * np.cos(azimuth), sine * np.sin(azimuth)
+    return along[:, None] * one + across[:, None] * other + cosine[:, None] * pole
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    length: FloatArray = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.maximum(length, 1e-30)

@@ -1,0 +1,369 @@
+"""The lit mesh on the stage: lobes at the vertices on the processor, all else in a shader.
+
+A frame: the axes of all lobes at the vertices follow from normals, view and lights; the caller
+says how far the edge of the visible sky is there; these distances become vertex attributes, four
+in a vector, and are interpolated. A pixel makes its own lobes of the interpolated normal and its
+view, and takes their visible shares (as ``shading.shaded``; the table as a formula,
+:mod:`.edge_share`).
+
+Nothing is built anew for a frame: distances are written into the arrays of the mesh, lights and
+the eye are uniforms (whose values, other than their names, VTK changes without a new shader: seen).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipelines.drawing.stage import Camera, Shader, Stage, surface, texture
+from pipelines.ssdf_lighting.distances.edge_share import EDGE_SHARE_GLSL, edge_share
+from pipelines.ssdf_lighting.drawing.camera_rays import eye
+from pipelines.ssdf_lighting.drawing.numpy_view import DistancesAt
+from pipelines.ssdf_lighting.light.cosine_lobes import CosineLobes
+from pipelines.ssdf_lighting.light.gloss_lobes import COLUMNS as GLOSS_COLUMNS
+from pipelines.ssdf_lighting.light.gloss_lobes import GlossLobes
+from pipelines.ssdf_lighting.light.lobe_axes import AxisTables, lobe_axes
+from pipelines.ssdf_lighting.light.microfacets import LEAST_VIEW, Materials
+from pipelines.ssdf_lighting.light.shading import LobeTables, lobe_tables
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
+
+MOST_LIGHTS = 24
+"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
+_FINE = 2048
+"""Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
+
+
+class LitActor:
+    """A mesh on the stage, lit by N <= 24 spherical Gaussians.
+
+    vertices, normals: (V, 3), normals of length 1; triangles: (F, 3), each inside one object.
+    object_of_vertex: (V,) rows of ``materials``.
+    lights: those of the first frame; others of the same number may follow.
+
+    ``actors`` are for ``Stage.add``: all that is glossy, then all that is not. Software renderers
+    take both sides of a branch; so what has no gloss has a shader without. Raises ValueError for
+    more lights, as ``lobe_tables`` does, and for objects that have no material.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        normals: ArrayLike,
+        object_of_vertex: ArrayLike,
+        materials: Materials,
+        lights: Lights,
+    ) -> None:
+        count = len(lights.sharpness)
+        if not 1 <= count <= MOST_LIGHTS:
+            raise ValueError(f"there are {count} lights; expected 1 to {MOST_LIGHTS} on the stage.")
+        objects = np.asarray(object_of_vertex)
+        if objects.size and not 0 <= objects.min() <= objects.max() < len(materials.specular):
+            raise ValueError(
+                f"object_of_vertex: found {objects.min()} to {objects.max()}, expected rows of "
+                f"{len(materials.specular)} materials."
+            )
+        self._materials = materials
+        self._points = np.ascontiguousarray(vertices, np.float32)
+        self._normals = np.ascontiguousarray(normals, np.float32)
+        self._objects = objects.astype(np.int32)
+        self._sharpness = np.array(lights.sharpness)
+        tables = lobe_tables(materials, lights)
+        self._axis_tables = AxisTables(tables, materials.specular > 0)
+        corners = np.asarray(triangles)
+        glossy = materials.specular[objects[corners[:, 0]]] > 0
+        self._parts = [
+            _Part(
+                self._points,
+                corners[chosen],
+                self._normals,
+                objects,
+                materials,
+                tables,
+                has_gloss=has_gloss,
+            )
+            # First what is likely in front: less is painted over.
+            for has_gloss, chosen in ((True, glossy), (False, ~glossy))
+            if chosen.any()
+        ]
+        self.actors = [part.actor for part in self._parts]
+        self._set_lights(np.zeros(4), lights)
+
+    def relight(self, camera: Camera, lights: Lights, distances_at: DistancesAt) -> None:
+        """Make the next frame show this view and these lights.
+
+        ``distances_at`` gets the axes (V, 2 N, 3) float32 of the lobes at the vertices, zeros where
+        there is no gloss, and returns d (V, 2 N), radians. Raises ValueError for another number of
+        lights than before and for distances of another shape.
+        """
+        if len(lights.sharpness) != len(self._sharpness):
+            raise ValueError(
+                f"there are {len(lights.sharpness)} lights; expected {len(self._sharpness)}."
+            )
+        if not np.array_equal(lights.sharpness, self._sharpness):
+            self._sharpness = np.array(lights.sharpness)
+            tables = lobe_tables(self._materials, lights)
+            self._axis_tables = AxisTables(tables, self._materials.specular > 0)
+            for part in self._parts:
+                part.show_tables(tables)
+        self.show_distances(distances_at(self.axes(camera, lights)))
+        self._set_lights(eye(camera), lights)
+
+    def axes(self, camera: Camera, lights: Lights) -> NDArray[np.float32]:
+        """Axes (V, 2 N, 3) float32 of the lobes at the vertices."""
+        return lobe_axes(
+            self._points, self._normals, self._objects, eye(camera), self._axis_tables, lights
+        )
+
+    def show_distances(self, distances: NDArray[np.floating]) -> None:
+        """Put distances (V, 2 N) at the lobes' axes into the vertex attributes."""
+        expected = (len(self._points), 2 * len(self._sharpness))
+        if distances.shape != expected:
+            raise ValueError(f"distances: found shape {distances.shape}, expected {expected}.")
+        for part in self._parts:
+            part.show_distances(distances)
+
+    def _set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
+        for part in self._parts:
+            part.set_lights(seen_from, lights)
+
+
+class _Part:
+    """The triangles of a lit mesh that share a shader; only their vertices."""
+
+    def __init__(
+        self,
+        points: NDArray[np.float32],
+        triangles: NDArray[np.integer],
+        normals: NDArray[np.float32],
+        objects: NDArray[np.integer],
+        materials: Materials,
+        tables: LobeTables,
+        *,
+        has_gloss: bool,
+    ) -> None:
+        self._chosen, corners = np.unique(triangles, return_inverse=True)
+        self._count = count = len(tables.cosine.irradiance)
+        self._matt = _fixed(_matt_rows(tables.cosine))
+        textures = {"matt": self._matt, "materials": _fixed(_material_rows(materials))}
+        if has_gloss:
+            textures["gloss"] = _fixed(_gloss_rows(tables.gloss))
+        names = [f"edge{number}" for number in range(-(-count // 4) * (1 + has_gloss))]
+        self.actor = surface(
+            points[self._chosen],
+            corners.reshape(-1, 3),
+            attributes={
+                "shading": normals[self._chosen],
+                "object": objects[self._chosen],
+                # Each its own: the mesh keeps them, and they are written to.
+                **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
+            },
+            textures=textures,
+            shader=_shader(names, count, has_gloss),
+            lit=False,
+        )
+        self._arrays, self._edges = _arrays_of(self.actor, names)
+        self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
+
+    def show_tables(self, tables: LobeTables) -> None:
+        _memory_of(self._matt)[:] = _matt_rows(tables.cosine)
+        self._matt.GetInput().GetPointData().GetScalars().Modified()
+        self._matt.GetInput().Modified()
+
+    def show_distances(self, distances: NDArray[np.floating]) -> None:
+        groups = -(-self._count // 4)
+        for number, (array, values) in enumerate(zip(self._arrays, self._edges, strict=True)):
+            half, group = divmod(number, groups)
+            width = min(4, self._count - 4 * group)
+            first = half * self._count + 4 * group
+            values[:, :width] = distances[self._chosen, first : first + width]
+            array.Modified()
+
+    def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
+        rows = np.column_stack([lights.axes, lights.sharpness])
+        self._uniforms.SetUniform4f("eye", seen_from.tolist())
+        for number, (row, colour) in enumerate(zip(rows, lights.amplitudes, strict=True)):
+            self._uniforms.SetUniform4f(f"towards{number}", row.tolist())
+            self._uniforms.SetUniform3f(f"colour{number}", colour.tolist())
+
+
+def draw_lit(
+    stage: Stage | tuple[int, int],
+    actor: LitActor,
+    camera: Camera,
+    lights: Lights,
+    distances_at: DistancesAt,
+) -> NDArray[np.float32]:
+    """Linear radiance and coverage (height, width, 4) of the lit mesh.
+
+    ``stage`` is the one that holds ``actor.actors``, or the size (width, height) of a new one for
+    this picture alone. Raises ValueError as ``LitActor.relight``.
+    """
+    if not isinstance(stage, Stage):
+        with Stage(*stage) as made:
+            made.add(*actor.actors)
+            return draw_lit(made, actor, camera, lights, distances_at)
+    actor.relight(camera, lights, distances_at)
+    stage.look(camera)
+    return stage.radiance()
+
+
+# ---- tables and memory of the graphics library -------------------------------------------------
+
+
+def _matt_rows(lobes: CosineLobes) -> NDArray[np.float32]:
+    """(N, _FINE + 1, 3): irradiance / pi, sqrt(1 + λ), 1 / share at the horizon."""
+    cosine = np.linspace(-1.0, 1.0, lobes.irradiance.shape[1])
+    horizon = np.arcsin(np.clip(lobes.along * cosine + lobes.up, -1.0, 1.0))
+    whole = edge_share(horizon, lobes.sharpness)
+    coarse = np.stack([lobes.irradiance / np.pi, np.sqrt(1 + lobes.sharpness), 1 / whole])
+    place = np.linspace(0.0, coarse.shape[2] - 1.0, _FINE + 1)
+    left = np.minimum(place.astype(np.int64), coarse.shape[2] - 2)
+    fine = coarse[..., left] + (place - left) * (coarse[..., left + 1] - coarse[..., left])
+    return np.moveaxis(fine, 0, -1).astype(np.float32)
+
+
+def _gloss_rows(lobes: GlossLobes) -> NDArray[np.float32]:
+    return np.stack(lobes, axis=-1).astype(np.float32)
+
+
+def _material_rows(materials: Materials) -> NDArray[np.float32]:
+    rows = np.zeros((2, len(materials.specular), 4), np.float32)
+    rows[0, :, :3], rows[0, :, 3] = materials.albedo, materials.specular
+    rows[1, :, 0] = materials.roughness
+    return rows
+
+
+def _fixed(rows: NDArray[np.float32]) -> Any:
+    """A texture whose row 0 is at t = 0, for texelFetch."""
+    return texture(np.ascontiguousarray(rows[::-1]), wrap="clamp", interpolate=False)
+
+
+def _memory_of(made: Any) -> NDArray[np.float32]:
+    """The texels (row, column, channel) of a texture, row 0 at t = 0; writing changes them."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    image = made.GetInput()
+    width, height, _ = image.GetDimensions()
+    texels: NDArray[np.float32] = vtk_to_numpy(image.GetPointData().GetScalars())
+    return texels.reshape(height, width, -1)
+
+
+def _arrays_of(actor: Any, names: list[str]) -> tuple[list[Any], list[NDArray[np.float32]]]:
+    """The named vertex attributes, and their values (V, 4); writing changes them."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    points = actor.GetMapper().GetInput().GetPointData()
+    arrays = [points.GetArray(name) for name in names]
+    return arrays, [vtk_to_numpy(array) for array in arrays]
+
+
+# ---- the shader --------------------------------------------------------------------------------
+
+
+def _shader(names: list[str], count: int, has_gloss: bool) -> Shader:
+    declared = "".join(f" in vec4 {name}; out vec4 {name}Out;" for name in names)
+    passed = "".join(f" {name}Out = {name};" for name in names)
+    return Shader(
+        vertex={
+            "Normal::Dec": "in vec3 shading; in float object; out vec3 shadingOut;"
+            f" out vec3 placeOut; flat out float objectOut;{declared}",
+            "Normal::Impl": "shadingOut = shading; placeOut = vertexMC.xyz; objectOut = object;"
+            + passed,
+        },
+        fragment={
+            "Normal::Dec": "in vec3 shadingOut; in vec3 placeOut; flat in float objectOut;"
+            + "".join(f" in vec4 {name}Out;" for name in names)
+            + EDGE_SHARE_GLSL
+            + (_GLOSS_FUNCTIONS if has_gloss else ""),
+            "Color::Impl": _fragment(names, count, has_gloss),
+        },
+    )
+
+
+def _fragment(names: list[str], count: int, has_gloss: bool) -> str:
+    # Written out light by light: edges and lights at known places are read much faster.
+    return f"""//VTK::Color::Impl
+  vec3 normal = normalize(shadingOut);
+  int row = int(objectOut + 0.5);
+  vec4 look = texelFetch(materials, ivec2(row, 0), 0);
+  vec3 lit = vec3(0.0), lobe;
+{"".join(_matt(number) for number in range(count))}
+  lit *= look.rgb;
+{_gloss(count) if has_gloss else ""}
+  ambientColor = lit;
+  diffuseColor = vec3(0.0);
+"""
+
+
+def _matt(number: int) -> str:
+    return f"""
+  lobe = texelFetch(matt, ivec2(dot(normal, towards{number}.xyz) * {_FINE / 2}
+    + {(_FINE + 1) / 2}, {number}), 0).rgb;
+  lit += colour{number} * (lobe.x
+    * min(edgeShare(edge{number // 4}Out[{number % 4}], lobe.y) * lobe.z, 1.0));"""
+
+
+_GLOSS_FUNCTIONS = """
+float smith(float cosine, float roughness) {
+  float level = sqrt(max(1.0 - cosine * cosine, 1e-12));
+  float a = min(max(cosine, 0.0) / (roughness * level), 1.6);
+  return min((3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a), 1.0);
+}
+float fresnel(float cosine, float index) {
+  float c = clamp(cosine, 1e-6, 1.0);
+  float g = sqrt(index * index - 1.0 + c * c);
+  float across = (g - c) / (g + c), along = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
+  return 0.5 * across * across * (1.0 + along * along);
+}
+// One light's gloss of an amplitude of 1. lobe: kappa, (along, up), ln(amplitude).
+float gleam(vec4 light, float d, vec3 normal, vec3 view, vec3 towards, vec4 lobe,
+            float roughness, float index, float constant) {
+  vec3 joined = lobe.x * towards + light.w * light.xyz;
+  float sharp = length(joined);
+  vec3 axis = joined / sharp;
+  float height = dot(axis, normal);
+  vec3 halfway = normalize(axis + view);
+  float squared = dot(halfway, normal);
+  squared = max(squared * squared, 1e-12);
+  float rest = constant * smith(height, roughness) * fresnel(dot(halfway, view), index)
+    / (squared * squared);
+  float truth = max(
+    log(max(rest, 1e-30)) + (1.0 - 1.0 / squared) / (roughness * roughness), -69.0);
+  vec3 apart = towards - light.xyz, off = axis - towards;
+  float lost = lobe.x * light.w * dot(apart, apart) / (sharp + lobe.x + light.w);
+  float fit = lobe.w - 0.5 * lobe.x * dot(off, off);
+  float narrow = light.w / (light.w + lobe.x);
+  float value = exp(lobe.w - lost + narrow * (truth - fit))
+    * (1.0 - exp(-2.0 * sharp)) * 6.28318531 / sharp;
+  float k = sqrt(1.0 + sharp);
+  float share = edgeShare(d, k) / max(edgeShare(asin(clamp(height, -1.0, 1.0)), k), 1e-3);
+  return height > 0.0 ? value * min(share, 1.0) : 0.0;
+}
+"""
+
+
+def _gloss(count: int) -> str:
+    groups = -(-count // 4)
+    lights = "".join(
+        f"""
+  lit += colour{number} * gleam(towards{number}, edge{groups + number // 4}Out[{number % 4}],
+    normal, view, towards, from, roughness, index, constant);"""
+        for number in range(count)
+    )
+    return f"""
+  vec3 view = normalize(eye.xyz - eye.w * placeOut);
+  float facing = dot(normal, view);
+  float seen = clamp(facing, {LEAST_VIEW!r}, 1.0);
+  float column = seen * {GLOSS_COLUMNS - 1}.0;
+  int left = min(int(column), {GLOSS_COLUMNS - 2});
+  vec4 from = mix(texelFetch(gloss, ivec2(left, row), 0),
+                  texelFetch(gloss, ivec2(left + 1, row), 0), column - float(left));
+  vec3 towards = normalize(from.y * (2.0 * facing * normal - view) + from.z * normal);
+  float roughness = texelFetch(materials, ivec2(row, 1), 0).r;
+  float index = (1.0 + sqrt(look.a)) / (1.0 - sqrt(look.a));
+  float constant = smith(seen, roughness)
+    / (12.56637061 * roughness * roughness * seen);{lights}
+"""

@@ -1,0 +1,1 @@
+"""Environments as spherical Gaussians, and what surfaces make of them."""

@@ -1,0 +1,1 @@
+"""Streets on the stage."""

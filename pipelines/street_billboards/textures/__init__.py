@@ -1,0 +1,1 @@
+"""What billboards look like from each side, made small."""

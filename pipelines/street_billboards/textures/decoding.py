@@ -1,0 +1,254 @@
+"""Eigen-textures decoded on the CPU, for viewers anywhere (Eq. 1), as the shader does it.
+
+Between two stored views, weights and means are interpolated: Eq. 1 is linear in them, so that is
+the interpolation of the views. The paper compares drawing frames with this to decoding in the
+shader.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.street_billboards.textures.coded_arrays import starts
+from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.plane_resolution import sample_places
+
+Planes = tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]
+Scales = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
+Offsets = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+
+
+class Decodable(NamedTuple):
+    """The arrays of CompressedTextures with where each billboard's part of them begins."""
+
+    luma_chroma: bool
+    first: NDArray[np.int64]
+    direction: NDArray[np.uint8]
+    means: NDArray[np.uint8]
+    ranks: NDArray[np.uint8]
+    planes: Planes
+    """By channel, (r, side, side)."""
+    scales: Scales
+    weights: Planes
+    first_plane: Offsets
+    """By channel, (b + 1,), of planes and scales."""
+    first_weight: Offsets
+    """By channel, (b + 1,), of weights."""
+    first_mask: NDArray[np.int64]
+    masks: NDArray[np.uint8]
+
+
+def decodable(textures: CompressedTextures) -> Decodable:
+    """What the kernels read; make it once for many frames."""
+    views = np.diff(textures.first)
+    ranks = textures.ranks.astype(np.int64)
+    planes = [starts(ranks[:, c]) for c in range(3)]
+    weights = [starts(ranks[:, c] * views) for c in range(3)]
+    return Decodable(
+        textures.colour == "ycocg",
+        textures.first,
+        textures.direction,
+        textures.means,
+        textures.ranks,
+        textures.planes,
+        textures.scales,
+        textures.weights,
+        (planes[0], planes[1], planes[2]),
+        (weights[0], weights[1], weights[2]),
+        textures.first_mask,
+        textures.masks,
+    )
+
+
+def decoded_views(
+    textures: CompressedTextures | Decodable,
+    billboards: NDArray[np.integer],
+    position: NDArray[np.floating],
+    out: NDArray[np.uint8],
+) -> None:
+    """Textures of k billboards as their viewers see them, into ``out`` (k, 32, 32, 4) uint8.
+
+    billboards (k,): rows; position (k,): where the viewer stands in each one's fan, as
+    ``fan_position`` says. Channels are R, G, B, rounded, and alpha, 0 or 255: of the mask, or of
+    two views' masks interpolated like the colours, opaque from one half on. A billboard without a
+    view is transparent.
+    """
+    data = textures if isinstance(textures, Decodable) else decodable(textures)
+    _decode_many(data, billboards.astype(np.int64), position.astype(np.float64), out)
+
+
+@njit(cache=True, nogil=True)
+def view_pair(direction: NDArray[np.uint8], position: float) -> tuple[int, int, float]:
+    """The two views (rows of direction, (n,) rising) around a place in the fan, and the share of
+    the second, (position - lower) / (upper - lower); the first or last one alone beyond the ends.
+    """
+    last = len(direction) - 1
+    if position <= direction[0]:
+        return 0, 0, 0.0
+    if position >= direction[last]:
+        return last, last, 0.0
+    lower = 0
+    while direction[lower + 1] <= position:
+        lower += 1
+    begin, end = float(direction[lower]), float(direction[lower + 1])
+    return lower, lower + 1, (position - begin) / (end - begin)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _channel(
+    planes: NDArray[np.uint8],
+    scales: NDArray[np.float32],
+    lower: NDArray[np.uint8],
+    upper: NDArray[np.uint8],
+    fraction: float,
+    mean: float,
+    out: NDArray[np.float32],
+) -> None:
+    """One channel of Eq. 1, in codes, into ``out`` (32, 32); planes, scales and weights of two
+    views are of one billboard."""
+    side = planes.shape[1]
+    small = np.full((side, side), np.float32(mean), np.float32)
+    for k in range(len(planes)):
+        weight = (1.0 - fraction) * lower[k] + fraction * upper[k] - 128.0
+        amount = np.float32(scales[k] * weight / (127.0 * 127.0))
+        for y in range(side):
+            for x in range(side):
+                small[y, x] += amount * np.float32(np.int32(planes[k, y, x]) - 128)
+    if side == SIDE:
+        out[:] = small
+        return
+    before, after, share = sample_places(side)
+    row = np.empty(side, np.float32)
+    for y in range(SIDE):
+        for x in range(side):
+            top = small[before[y], x]
+            row[x] = top + share[y] * (small[after[y], x] - top)
+        for x in range(SIDE):
+            left = row[before[x]]
+            out[y, x] = left + share[x] * (row[after[x]] - left)
+
+
+@njit(cache=True, nogil=True)
+def decode_colours(
+    data: Decodable,
+    billboard: int,
+    lower: int,
+    upper: int,
+    fraction: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Colours between two views of a billboard into ``out`` (3, 32, 32), codes, clamped."""
+    begin = data.first[billboard]
+    views = data.first[billboard + 1] - begin
+    _one_channel(data, 0, billboard, begin, views, lower, upper, fraction, out)
+    _one_channel(data, 1, billboard, begin, views, lower, upper, fraction, out)
+    _one_channel(data, 2, billboard, begin, views, lower, upper, fraction, out)
+    for y in range(SIDE):
+        for x in range(SIDE):
+            red, green, blue = out[0, y, x], out[1, y, x], out[2, y, x]
+            if data.luma_chroma:
+                luma, orange, leaf = red, green - np.float32(128.0), blue - np.float32(128.0)
+                red, green, blue = luma + orange - leaf, luma + leaf, luma - orange - leaf
+            out[0, y, x] = min(max(red, np.float32(0.0)), np.float32(255.0))
+            out[1, y, x] = min(max(green, np.float32(0.0)), np.float32(255.0))
+            out[2, y, x] = min(max(blue, np.float32(0.0)), np.float32(255.0))
+
+
+@njit(cache=True, nogil=True)
+def _one_channel(
+    data: Decodable,
+    channel: int,
+    billboard: int,
+    begin: int,
+    views: int,
+    lower: int,
+    upper: int,
+    fraction: float,
+    out: NDArray[np.float32],
+) -> None:
+    rank = np.int64(data.ranks[billboard, channel])
+    plane = data.first_plane[channel][billboard]
+    start = data.first_weight[channel][billboard]
+    weights = data.weights[channel]
+    mean = (1.0 - fraction) * data.means[begin + lower, channel] + fraction * data.means[
+        begin + upper, channel
+    ]
+    _channel(
+        data.planes[channel][plane : plane + rank],
+        data.scales[channel][plane : plane + rank],
+        weights[start + lower * rank : start + (lower + 1) * rank],
+        weights[start + upper * rank : start + (upper + 1) * rank],
+        fraction,
+        mean,
+        out[channel],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _decode_many(
+    data: Decodable,
+    billboards: NDArray[np.int64],
+    position: NDArray[np.float64],
+    out: NDArray[np.uint8],
+) -> None:
+    colours = np.empty((3, SIDE, SIDE), np.float32)
+    for j in range(len(billboards)):
+        b = billboards[j]
+        begin, end = data.first[b], data.first[b + 1]
+        if begin == end:
+            out[j] = 0
+            continue
+        lower, upper, fraction = view_pair(data.direction[begin:end], position[j])
+        decode_colours(data, b, lower, upper, fraction, colours)
+        mask = data.first_mask[b]
+        each = data.first_mask[b + 1] - mask > 1
+        one = data.masks[mask + (lower if each else 0)]
+        other = data.masks[mask + (upper if each else 0)]
+        # One half is opaque: the upper view decides from the middle on.
+        nearer = other if fraction > 0.5 else one
+        for y in range(SIDE):
+            for x in range(SIDE):
+                for c in range(3):
+                    out[j, y, x, c] = np.uint8(colours[c, y, x] + np.float32(0.5))
+                bit = 128 >> (x & 7)
+                opaque = (nearer[y, x >> 3] & bit) != 0
+                if fraction == 0.5:
+                    opaque = opaque or (other[y, x >> 3] & bit) != 0
+                out[j, y, x, 3] = 255 if opaque else 0
+
+
+@njit(cache=True, nogil=True)
+def seen_errors(
+    data: Decodable,
+    first: NDArray[np.int64],
+    direction: NDArray[np.uint8],
+    colours: NDArray[np.uint8],
+    states: NDArray[np.uint8],
+    seen: int,
+    total: NDArray[np.float64],
+    count: NDArray[np.int64],
+) -> None:
+    """Sums of squares of errors of rounded colours where states are ``seen``, by billboard.
+
+    first, direction, colours, states are of ViewTextures; total and count (b,) are written, count
+    in channels of texels. Views are found by their direction.
+    """
+    buffer = np.empty((3, SIDE, SIDE), np.float32)
+    for b in range(len(total)):
+        total[b], count[b] = 0.0, 0
+        for i in range(first[b], first[b + 1]):
+            begin, end = data.first[b], data.first[b + 1]
+            lower, upper, fraction = view_pair(data.direction[begin:end], float(direction[i]))
+            decode_colours(data, b, lower, upper, fraction, buffer)
+            for y in range(SIDE):
+                for x in range(SIDE):
+                    if states[i, y, x] == seen:
+                        for c in range(3):
+                            code = np.int64(buffer[c, y, x] + np.float32(0.5))
+                            off = code - np.int64(colours[i, y, x, c])
+                            total[b] += off * off
+                        count[b] += 3

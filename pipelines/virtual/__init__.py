@@ -1,0 +1,1 @@
+"""Instruments that need no capture: what they measure is known exactly."""

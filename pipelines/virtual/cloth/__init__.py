@@ -1,0 +1,1 @@
+"""A gonioreflectometer, and cloths made of yarns to lay on it."""

@@ -1,0 +1,1 @@
+"""A pelt of hairs, photographed from above, whose depths are known."""
