@@ -4,13 +4,12 @@ A check that fails, or that cannot be computed, rejects the version: the last go
 afterwards. One that passes counts towards the promotion of a new version.
 """
 
+from __future__ import annotations
+
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import dagster as dg
 
 from storage.versions import Slot, VersionedStore
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Checked:
+class VersionUnderCheck:
     """What a figure is computed from: a version and the inputs it was made of."""
 
     store: VersionedStore
@@ -32,11 +31,11 @@ class Checked:
         return self.store.record(self.slot, self.version)
 
     @property
-    def dataset(self) -> "xr.Dataset":
+    def dataset(self) -> xr.Dataset:
         """The version, lazy."""
         return self.store.open(self.slot, self.version)
 
-    def input(self, asset: str) -> "xr.Dataset":
+    def input(self, asset: str) -> xr.Dataset:
         """The version of an upstream asset that this one was made from, lazy."""
         for entry in self.record["inputs"]:
             if entry["asset"] == asset:
@@ -51,7 +50,7 @@ class Check:
 
     name: str
     description: str
-    figure: Callable[[Checked], float | None]
+    figure: Callable[[VersionUnderCheck], float | None]
     at_most: float | None = None
     at_least: float | None = None
     change: float | None = None
@@ -92,66 +91,16 @@ class Check:
         return None
 
 
-def figure_before(checked: Checked, check: str) -> float | None:
+def figure_before(version: VersionUnderCheck, check: str) -> float | None:
     """The check's figure in the last good version of equal settings, if there is one."""
-    pointer = checked.store.pointer(checked.slot)
-    lineage = checked.record["lineage"]
-    for version in (pointer.version, *pointer.earlier):
-        if version in (None, checked.version):
+    store, slot = version.store, version.slot
+    pointer = store.pointer(slot)
+    lineage = version.record["lineage"]
+    for name in (pointer.version, *pointer.earlier):
+        if name in (None, version.version):
             continue
-        if checked.store.record(checked.slot, version)["lineage"] == lineage:
-            verdict = checked.store.verdicts(checked.slot, version).get(check)
+        if store.record(slot, name)["lineage"] == lineage:
+            verdict = store.verdicts(slot, name).get(check)
             if verdict and verdict["figure"] is not None:
                 return float(verdict["figure"])
     return None
-
-
-def build_check(
-    check: Check,
-    asset: dg.AssetsDefinition,
-    slot_of: Callable[[Any], Slot],
-) -> dg.AssetChecksDefinition:
-    """The blocking Dagster check. It is told its partitions: else it would load all of them."""
-    # Telling the partitions is a preview of Dagster's: its version is pinned.
-    warnings.filterwarnings("ignore", category=dg.PreviewWarning)
-
-    # Dagster looks at the annotations themselves: no postponed ones in this module.
-    @dg.asset_check(
-        asset=asset,
-        name=check.name,
-        description=check.description,
-        blocking=True,
-        partitions_def=asset.partitions_def,
-        required_resource_keys={"workspace"},
-    )
-    def evaluate(context: dg.AssetCheckExecutionContext) -> dg.AssetCheckResult:
-        store: VersionedStore = context.resources.workspace.store
-        slot = slot_of(context)
-        version = store.version_under_check(slot, context.run.run_id)
-        checked = Checked(store, slot, version)
-        metadata: dict[str, Any] = {"version": version}
-        try:
-            figure = check.figure(checked)
-        except Exception as error:
-            store.reject(slot, version, check.name, f"{type(error).__name__}: {error}")
-            raise
-        before = figure_before(checked, check.name)
-        problem = None if figure is None else check.problem(figure, before)
-        for name, value in (
-            ("figure", figure),
-            ("before", before),
-            ("at most", check.at_most),
-            ("at least", check.at_least),
-            ("largest step for the worse", check.change),
-        ):
-            if value is not None and math.isfinite(value):
-                metadata[name] = float(value)
-        if problem is None:
-            store.pass_version(slot, version, check.name, figure)
-            description = "does not apply here" if figure is None else None
-            return dg.AssetCheckResult(passed=True, metadata=metadata, description=description)
-        restored = store.reject(slot, version, check.name, problem)
-        metadata["current version now"] = restored or "none"
-        return dg.AssetCheckResult(passed=False, metadata=metadata, description=problem)
-
-    return evaluate

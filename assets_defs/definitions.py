@@ -8,18 +8,13 @@ from typing import Any
 
 import dagster as dg
 
-from assets_defs.glass_scratches import SCRATCHES
+from assets_defs.dagster_assets import dagster_assets, dagster_checks
 from assets_defs.inbox import inbox_sensor
-from assets_defs.neural_btf import BTF
-from assets_defs.photo_fur import FUR
 from assets_defs.rematerialisation import daily_schedule, launch_job
-from assets_defs.ssdf_lighting import SSDF
-from assets_defs.street_billboards import STREET
 from assets_defs.system import System
+from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import Workspace
 from storage.io_manager import ZarrIOManager
-
-SYSTEMS: dict[str, System] = {system.name: system for system in (FUR, BTF, SCRATCHES, SSDF, STREET)}
 
 
 def build_definitions(
@@ -43,8 +38,8 @@ def build_definitions(
     warnings.filterwarnings("ignore", category=dg.BetaWarning)
     launch = launch_job(SYSTEMS, lambda name: definitions.get_repository_def().get_job(name))
     definitions = dg.Definitions(
-        assets=[asset for system in systems for asset in system.assets],
-        asset_checks=[check for system in systems for check in system.asset_checks],
+        assets=[asset for system in systems for asset in dagster_assets(system)],
+        asset_checks=[check for system in systems for check in dagster_checks(system)],
         jobs=[*jobs, launch],
         schedules=[daily_schedule(launch)],
         sensors=[inbox_sensor(launch, SYSTEMS, place)],

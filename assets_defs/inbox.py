@@ -14,8 +14,10 @@ from typing import Any
 
 import dagster as dg
 
+from assets_defs.dagster_assets import dynamic_partitions
 from assets_defs.rematerialisation import LaunchConfig
-from assets_defs.system import Dimension, Source, System
+from assets_defs.sources import Source
+from assets_defs.system import Dimension, System
 from assets_defs.workspace import Workspace
 
 SETTLED_SECONDS = 3.0
@@ -41,7 +43,7 @@ def inbox_sensor(
         added: list[dg.AddDynamicPartitionsRequest] = []
         for system in systems.values():
             for dimension in system.dimensions:
-                partitions = system.dynamic(dimension.name)
+                partitions = dynamic_partitions(system, dimension.name)
                 registered = set(context.instance.get_dynamic_partitions(str(partitions.name)))
                 new = set(dimension.builtin) - registered
                 for path in system.files(dimension.name, workspace.inbox(system.name)):
@@ -94,7 +96,7 @@ def take_in(
         if not target.exists() or Source.of(target).fingerprint == fingerprint:
             break
     key = Source.of(target).key
-    instance.add_dynamic_partitions(str(system.dynamic(dimension.name).name), [key])
+    instance.add_dynamic_partitions(system.partitions_name(dimension.name), [key])
     if not target.exists():
         inbox.mkdir(parents=True, exist_ok=True)
         beside = target.with_name(f".{target.name}.part")

@@ -13,15 +13,19 @@ from typing import Any, Literal
 
 import dagster as dg
 
+from assets_defs.provenance import partition_key, provenance
 from assets_defs.settings import Settings, resolve
-from assets_defs.system import INTERRUPTED, AssetPlan, Progress, System, partition_key, provenance
+from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
+from storage.io_manager import INTERRUPTED
 from storage.versions import Slot
 
 _QUIET = {"console": {"config": {"log_level": "CRITICAL"}}}
 """The instance keeps every event; a terminal shows the progress and the outcome."""
 
 JobByName = Callable[[str], dg.JobDefinition]
+LaunchProgress = Callable[[str, float], None]
+"""Told what is being done, a system or an asset with its partition, and the fraction done."""
 
 
 class LaunchError(Exception):
@@ -69,7 +73,7 @@ class Launcher:
     instance: dg.DagsterInstance
     workspace: Workspace
     job: JobByName
-    progress: Progress
+    progress: LaunchProgress
 
     def launch(self, request: Request) -> list[Outcome]:
         """Run what is not current. Raises SettingsError, ValueError before any work; LaunchError.
@@ -80,8 +84,8 @@ class Launcher:
         """
         planned = self._plan(request)
         for dimension in request.system.dimensions:
-            name = request.system.dynamic(dimension.name).name
-            self.instance.add_dynamic_partitions(str(name), _keys(request, dimension.name))
+            name = request.system.partitions_name(dimension.name)
+            self.instance.add_dynamic_partitions(name, _keys(request, dimension.name))
         outcomes: list[Outcome] = []
         failures: list[str] = []
         failed: list[dict[str, str]] = []
@@ -115,16 +119,15 @@ class Launcher:
                 source = system.source_of(plan, keys, inbox)
                 if source is not None:
                     system.dimension(*by).check(source, settings.model_dump())
-        if system.check is not None:
-            for asked in request.partitions:
-                system.check(
-                    {name: system.source(name, key, inbox) for name, key in asked.items()},
-                    {
-                        plan.name: self._settings(request, plan, {d: asked[d] for d in plan.by})
-                        for plan in system.plans.values()
-                        if set(plan.by) <= set(asked)
-                    },
-                )
+        for asked in request.partitions:
+            sources = {name: system.source(name, key, inbox) for name, key in asked.items()}
+            chosen = {
+                plan.name: self._settings(request, plan, {d: asked[d] for d in plan.by})
+                for plan in system.plans.values()
+                if set(plan.by) <= set(asked)
+            }
+            for ask in system.asked_before_work:
+                ask(sources, chosen)
         return planned
 
     def _run_grain(

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
-from assets_defs.pictures import table
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
-from assets_defs.system import Dimension, Metadata, Source, System
+from assets_defs.sources import Source
+from assets_defs.system import Dimension, Metadata, System
 from pipelines.photo_fur import figures
 from pipelines.photo_fur.attenuation import MOST_LAYERS, Tails
 from pipelines.photo_fur.drawing import Fill
@@ -97,11 +97,11 @@ def _photo_pictures(dataset: xr.Dataset) -> Pictures:
     return {"photograph": to_8bit(dataset["radiance"].values)}
 
 
-def _contrast(checked: Checked) -> float:
+def _contrast(checked: VersionUnderCheck) -> float:
     return figures.contrast(checked.dataset["luminance"].values)
 
 
-def _clipped_share(checked: Checked) -> float:
+def _clipped_share(checked: VersionUnderCheck) -> float:
     return figures.clipped_share(checked.dataset["radiance"].values)
 
 
@@ -201,12 +201,12 @@ def _attenuation_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _kept_share(checked: Checked) -> float:
+def _kept_share(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return float(dataset["pixels_per_layer"].sum() / dataset["histogram"].sum())
 
 
-def _decay_error(checked: Checked) -> float:
+def _decay_error(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return figures.decay_error(
         dataset["boundary_luminance"].values,
@@ -215,7 +215,7 @@ def _decay_error(checked: Checked) -> float:
     )
 
 
-def _depth_rank_correlation(checked: Checked) -> float | None:
+def _depth_rank_correlation(checked: VersionUnderCheck) -> float | None:
     dataset = checked.dataset
     if "depth_rank_correlation" not in dataset:
         return None
@@ -295,7 +295,7 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
             zip(boundaries[:-1], boundaries[1:], pixels, strict=True)
         )
     ]
-    return xr.Dataset(variables), {**shown, "layers": table(rows)}
+    return xr.Dataset(variables), {**shown, "layers": rows}
 
 
 # ---- shell_stack -----------------------------------------------------------------------------
@@ -316,12 +316,12 @@ def _stack_pictures(dataset: xr.Dataset) -> Pictures:
     return {"layers": layer_picture(dataset["layer"].values, dataset.sizes["shell"])}
 
 
-def _partition_error(checked: Checked) -> float:
+def _partition_error(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return figures.partition_error(dataset["layer"].values, dataset["mask"].values)
 
 
-def _interval_error(checked: Checked) -> float:
+def _interval_error(checked: VersionUnderCheck) -> float:
     settings = checked.record["settings"]
     return figures.interval_error(
         checked.dataset["layer"].values,
@@ -399,14 +399,14 @@ class MeshSettings(Settings):
         return cls(layers=8 if keys["mesh"] == SQUARE else 15)
 
 
-def _step_error(checked: Checked) -> float:
+def _step_error(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return figures.step_error(
         dataset["vertices"].values, dataset["normals"].values, float(dataset["thickness"])
     )
 
 
-def _stretch(checked: Checked) -> float:
+def _stretch(checked: VersionUnderCheck) -> float:
     from pipelines.geometry.shapes import texture_stretch
 
     dataset = checked.dataset.load()
@@ -506,7 +506,7 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     return {"frames": contact_sheet(dataset["frames"].values)}
 
 
-def _top_view_rmse(checked: Checked) -> float | None:
+def _top_view_rmse(checked: VersionUnderCheck) -> float | None:
     from pipelines.photo_fur.frames import top_view_error
 
     from_above = checked.dataset["elevation"].values == 90.0
@@ -516,11 +516,11 @@ def _top_view_rmse(checked: Checked) -> float | None:
     return top_view_error(picture, checked.input("fur_photo")["radiance"].values)
 
 
-def _least_coverage(checked: Checked) -> float:
+def _least_coverage(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["coverage"].min())
 
 
-def _mean_brightness(checked: Checked) -> float:
+def _mean_brightness(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["frames"].astype("float64").mean() / 255.0)
 
 

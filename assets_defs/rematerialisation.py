@@ -33,7 +33,7 @@ def launch_job(systems: Mapping[str, System], job: JobByName) -> dg.JobDefinitio
         chosen = [systems[config.system]] if config.system else list(systems.values())
         failures = []
         for system in chosen:
-            partitions = config.partitions or system.made(workspace)
+            partitions = config.partitions or system.stored_partitions(workspace)
             try:
                 outcomes = launcher.launch(Request(system, partitions, force=config.force))
             except LaunchError as error:

@@ -1,8 +1,8 @@
 """Settings of assets: typed, with presets, remembered by the versions that they made.
 
-A system declares plain pydantic classes. Dagster gets a config class with the same fields, all
-optional, and ``preset``: what is not given comes from the current version's settings, so a
-rematerialisation repeats what was there; without a current version it comes from the preset.
+A system declares plain pydantic classes. What is not given comes from the current version's
+settings, so a rematerialisation repeats what was there; without a current version it comes from
+the preset.
 """
 
 from __future__ import annotations
@@ -10,10 +10,8 @@ from __future__ import annotations
 import typing
 from collections.abc import Mapping
 from pathlib import Path
-from types import UnionType
-from typing import Any, ClassVar, Literal, Self, Union
+from typing import Any, ClassVar, Literal, Self
 
-import dagster as dg
 import pydantic
 
 Preset = Literal["test", "demo", "paper"]
@@ -81,25 +79,3 @@ def resolve(
         raise SettingsError(
             f"{asset}: setting {field!r} is {first['input']!r}; {expected}."
         ) from error
-
-
-def config_class(settings: type[Settings]) -> type[dg.Config]:
-    """The Dagster config of a settings class: `preset` and every field, all optional."""
-    fields: dict[str, Any] = {"preset": (str | None, pydantic.Field(default=None))}
-    for name, field in settings.model_fields.items():
-        about = pydantic.Field(default=None, description=field.description)
-        fields[name] = (_plain_type(field.annotation) | None, about)
-    made = pydantic.create_model(f"{settings.__name__}Config", __base__=dg.Config, **fields)
-    return made
-
-
-def _plain_type(annotation: Any) -> Any:
-    """The type as Dagster's config system knows it."""
-    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is Literal:
-        return type(arguments[0])
-    if origin is tuple:
-        return list[arguments[0]]  # type: ignore[valid-type]
-    if origin in (Union, UnionType):
-        return _plain_type(next(kind for kind in arguments if kind is not type(None)))
-    return annotation

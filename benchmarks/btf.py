@@ -30,9 +30,9 @@ from rich.console import Console
 
 from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, Request
-from assets_defs.neural_btf import BTF
 from assets_defs.neural_btf.datasets import compressed, payload_bytes
 from assets_defs.neural_btf.declaration import NONE, NetworkSettings
+from assets_defs.neural_btf.graph import BTF
 from assets_defs.neural_btf.network import packed, training_data, training_plan
 from assets_defs.workspace import CHECKOUT, Workspace
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table

@@ -21,11 +21,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from assets_defs.ssdf_lighting import SSDF
 from assets_defs.ssdf_lighting.compression import (
     distance_blocks,
     shared_basis_of,
 )
+from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.ssdf_lighting.visibility import unpacked
 from assets_defs.workspace import CHECKOUT, Workspace

@@ -20,7 +20,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from assets_defs.street_billboards import STREET
 from assets_defs.street_billboards.compression import RAW_BYTES
 from assets_defs.street_billboards.datasets import (
     billboards_of,
@@ -29,6 +28,7 @@ from assets_defs.street_billboards.datasets import (
     viewers,
     views_of,
 )
+from assets_defs.street_billboards.graph import STREET
 from assets_defs.workspace import CHECKOUT, Workspace
 from benchmarks.street_codecs import blocks_coded
 from benchmarks.street_drive import KEYS, launch

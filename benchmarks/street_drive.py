@@ -18,7 +18,7 @@ import dagster as dg
 
 from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, Request
-from assets_defs.street_billboards import STREET
+from assets_defs.street_billboards.graph import STREET
 from assets_defs.workspace import Workspace
 
 KEYS = {"drive": "city"}

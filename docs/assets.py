@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from assets_defs.definitions import SYSTEMS
+from assets_defs.systems import SYSTEMS
 
 PAGE = Path(__file__).parent / "assets.md"
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from assets_defs.glass_scratches import SCRATCHES
-from assets_defs.neural_btf import BTF
+from assets_defs.glass_scratches.graph import SCRATCHES
+from assets_defs.neural_btf.graph import BTF
 from assets_defs.photo_fur import FUR
-from assets_defs.ssdf_lighting import SSDF
-from assets_defs.street_billboards import STREET
+from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.datasets import billboards_of, pages_of, views_of
+from assets_defs.street_billboards.graph import STREET
 from assets_defs.street_billboards.textures import TextureSettings, view_textures
 from assets_defs.system import System
 from assets_defs.workspace import Workspace

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 import click
 from rich.console import Console
 
-from assets_defs.definitions import SYSTEMS
 from assets_defs.inbox import take_in
 from assets_defs.launcher import LaunchError, Outcome, Request, check_settings
 from assets_defs.settings import PRESETS
 from assets_defs.system import Dimension, System
+from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import CHECKOUT, Workspace
 from storage.errors import StoreError
 from tsuya.doctor import examine
@@ -88,7 +88,7 @@ def _run_command(system: System) -> click.Command:
                 ]
                 for dimension in system.dimensions
             }
-            request = Request(system, system.span(chosen), preset, given, force)
+            request = Request(system, system.cross_product(chosen), preset, given, force)
             launched = _launch(session, [request])
         _report(session, launched, as_json)
 

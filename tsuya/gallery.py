@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from assets_defs.definitions import SYSTEMS
+from assets_defs.systems import SYSTEMS
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import Any
 
 from rich.table import Table
 
-from assets_defs.definitions import SYSTEMS
 from assets_defs.launcher import Outcome
+from assets_defs.systems import SYSTEMS
 from storage.versions import Slot, VersionedStore
 from storage.zarr_files import stored_bytes
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.settings import Settings
-from assets_defs.system import Dimension, Source, System
+from assets_defs.sources import Source
+from assets_defs.system import Dimension, System
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
@@ -40,24 +40,6 @@ def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
             check_closed(vertices, triangles)
         except ValueError as error:
             raise ValueError(f"{source.name}: {error}") from error
-
-
-def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """Walls, layers, glass and environment, before anything is made of them."""
-    from assets_defs.glass_scratches.frames import FrameSettings, check_environment_setting
-    from assets_defs.glass_scratches.layers import LayerSettings, layer_spec
-    from assets_defs.glass_scratches.tables import TableSettings
-    from pipelines.glass_scratches.tables.scratch_table import check_method
-
-    walls = settings.get("scratch_table_2d")
-    if isinstance(walls, TableSettings):
-        check_method(walls.method, walls.roughness)
-    scattered = settings.get("scratch_layers")
-    if isinstance(scattered, LayerSettings):
-        layer_spec(scattered).validate()
-    shown = settings.get("glass_frames")
-    if isinstance(shown, FrameSettings):
-        check_environment_setting(shown)
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
@@ -113,6 +95,5 @@ SCRATCHES = System(
             check=_check_object,
         ),
     ),
-    check=_check_together,
     overview=_overview,
 )

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.glass_scratches.declaration import ENVIRONMENTS, SCRATCHES
 from assets_defs.settings import Preset, Settings, UserFile
-from assets_defs.system import Metadata, Source
+from assets_defs.sources import Source
+from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class ObjectSettings(Settings):
     }
 
 
-def _edge_error(checked: Checked) -> float:
+def _edge_error(checked: VersionUnderCheck) -> float:
     """Share of the edges without exactly two triangles of opposite senses."""
     import numpy as np
 
@@ -55,7 +56,7 @@ def _edge_error(checked: Checked) -> float:
     return float(1 - np.isin(one * count + other, other * count + one).mean())
 
 
-def _volume(checked: Checked) -> float:
+def _volume(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["volume"])
 
 
@@ -143,6 +144,13 @@ class FrameSettings(Settings):
     }
 
 
+@SCRATCHES.before_work
+def _environment_exists(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    shown = settings.get("glass_frames")
+    if isinstance(shown, FrameSettings):
+        check_environment_setting(shown)
+
+
 def check_environment_setting(settings: FrameSettings) -> None:
     """Raises ValueError, BadInput for what names no environment."""
     if settings.environment not in ENVIRONMENTS:
@@ -188,35 +196,35 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _not_finite(checked: Checked) -> float:
+def _not_finite(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     radiance = checked.dataset["radiance"].values
     return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))
 
 
-def _furnace_excess(checked: Checked) -> float:
+def _furnace_excess(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.figures import brightest_excess
 
     dataset = checked.dataset
     return brightest_excess(dataset["furnace"].values, dataset["furnace_error"].values)
 
 
-def _furnace_loss(checked: Checked) -> float:
+def _furnace_loss(checked: VersionUnderCheck) -> float:
     return float(1 - checked.dataset["furnace"].values.mean())
 
 
-def _mean_brightness(checked: Checked) -> float:
+def _mean_brightness(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["frames"].values.mean() / 255.0)
 
 
-def _stage_brightness(checked: Checked) -> float:
+def _stage_brightness(checked: VersionUnderCheck) -> float:
     """Mean of the stage's pictures over that of the traced ones."""
     dataset = checked.dataset
     return float(dataset["stage"].values.mean() / dataset["frames"].values.mean())
 
 
-def _scratched_share(checked: Checked) -> float:
+def _scratched_share(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["scratched"].values[1].mean())
 
 

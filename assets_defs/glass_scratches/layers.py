@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
 from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
 
@@ -71,6 +72,13 @@ class LayerSettings(Settings):
         return cls(**looks.get(keys["setting"], {}), **sizes.get(name, {}))
 
 
+@SCRATCHES.before_work
+def _layers_can_be(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    scattered = settings.get("scratch_layers")
+    if isinstance(scattered, LayerSettings):
+        layer_spec(scattered).validate()
+
+
 def layer_spec(settings: LayerSettings) -> LayerSpec:
     """The settings as the type of `pipelines`. Raises ValueError for a resolution that is no power
     of two."""
@@ -114,7 +122,7 @@ def _layer_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _coverage_error(checked: Checked) -> float | None:
+def _coverage_error(checked: VersionUnderCheck) -> float | None:
     """Against what was asked for, or for a threshold against what Poisson points give."""
     import numpy as np
 
@@ -129,7 +137,7 @@ def _coverage_error(checked: Checked) -> float | None:
     return float(np.abs(found / wanted - 1).mean())
 
 
-def _map_z(checked: Checked) -> float:
+def _map_z(checked: VersionUnderCheck) -> float:
     """RMS z-score of the maps' means over 8 x 8 blocks against the scratches sampled anew."""
     from pipelines.glass_scratches.figures import block_z_rms
     from pipelines.glass_scratches.layers.scratch_layers import coverage_maps

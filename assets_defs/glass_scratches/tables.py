@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
-from assets_defs.system import Metadata, Source
+from assets_defs.sources import Source
+from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
 
 if TYPE_CHECKING:
@@ -51,12 +52,12 @@ def _profile_pictures(dataset: xr.Dataset) -> Pictures:
     return {"profile": profile_picture(dataset["points"].values)}
 
 
-def _aspect(checked: Checked) -> float:
+def _aspect(checked: VersionUnderCheck) -> float:
     points = checked.dataset["points"].values
     return float(-points[:, 1].min() / (points[-1, 0] - points[0, 0]))
 
 
-def _opening_tilt(checked: Checked) -> float:
+def _opening_tilt(checked: VersionUnderCheck) -> float:
     points = checked.dataset["points"].values
     return float(abs(points[[0, -1], 1]).max() + max(points[:, 1].max(), 0.0))
 
@@ -130,13 +131,22 @@ class TableSettings(Settings):
         return cls(roughness=0.0 if keys["setting"] == "mirror" else 1.0, **sizes)
 
 
+@SCRATCHES.before_work
+def _method_suits_walls(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    from pipelines.glass_scratches.tables.scratch_table import check_method
+
+    walls = settings.get("scratch_table_2d")
+    if isinstance(walls, TableSettings):
+        check_method(walls.method, walls.roughness)
+
+
 def _table_pictures(dataset: xr.Dataset) -> Pictures:
     from pipelines.glass_scratches.drawing.pictures import table_picture
 
     return {"table": table_picture(dataset["rho"].values)}
 
 
-def _furnace_error(checked: Checked) -> float:
+def _furnace_error(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.tables.exact import leaving_share
 
     dataset = checked.dataset
@@ -144,7 +154,7 @@ def _furnace_error(checked: Checked) -> float:
     return float(abs(leaving + dataset["absorbed"].values - 1).max())
 
 
-def _reciprocity_error(checked: Checked) -> float:
+def _reciprocity_error(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.figures import reciprocity_error
 
     return reciprocity_error(
@@ -152,7 +162,7 @@ def _reciprocity_error(checked: Checked) -> float:
     )
 
 
-def _paths_z(checked: Checked) -> float:
+def _paths_z(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.figures import paths_z_rms
 
     settings = checked.record["settings"]
@@ -165,7 +175,7 @@ def _paths_z(checked: Checked) -> float:
     )
 
 
-def _across_error(checked: Checked) -> float:
+def _across_error(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     mean = dataset["across"].values.mean(axis=0, dtype="float64")
     rho = dataset["rho"].values
@@ -257,7 +267,7 @@ def _spatial_pictures(dataset: xr.Dataset) -> Pictures:
     return {"leans": lean_picture(dataset["factor"].values, dataset["gamma"].values)}
 
 
-def _sampler_p(checked: Checked) -> float:
+def _sampler_p(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.figures import sampler_p_value
     from pipelines.glass_scratches.tables.sampling import lobe_of
 
@@ -272,7 +282,7 @@ def _sampler_p(checked: Checked) -> float:
     )
 
 
-def _interpolation_error(checked: Checked) -> float:
+def _interpolation_error(checked: VersionUnderCheck) -> float:
     from pipelines.glass_scratches.tables.scratch_table import interpolation_error
 
     settings = checked.record["settings"]
@@ -280,7 +290,7 @@ def _interpolation_error(checked: Checked) -> float:
     return interpolation_error(bins, settings["refractive_index"], settings["fresnel"])["mean"]
 
 
-def _largest_share(checked: Checked) -> float:
+def _largest_share(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return float(dataset["share"].mean(dim="place").max())
 

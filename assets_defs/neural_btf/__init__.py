@@ -1,10 +1,5 @@
 """BTFs compressed by a neural network (docs/btf.md): the graph's assets and checks.
 
-`declaration` says what the assets are partitioned by; the other modules declare them, in the order
-of the graph.
+`declaration` says what the assets are partitioned by, the modules named in `graph` declare them in
+the order of the graph, `datasets` goes between stored datasets and the objects of `pipelines`.
 """
-
-from assets_defs.neural_btf import photographs, abrdfs, network, restoration  # noqa: I001, F401
-from assets_defs.neural_btf.declaration import BTF
-
-__all__ = ["BTF"]

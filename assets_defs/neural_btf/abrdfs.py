@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.neural_btf.datasets import (
     image_blocks,
 )
@@ -36,12 +36,14 @@ class MatrixSettings(Settings):
     )
 
 
-def _explained(checked: Checked) -> float:
+def _explained(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return float((dataset["singular_values"] ** 2).sum() / dataset["total_variation"])
 
 
-def _sampled(checked: Checked) -> tuple[xr.Dataset, NDArray[np.int64], NDArray[np.floating]]:
+def _sampled(
+    checked: VersionUnderCheck,
+) -> tuple[xr.Dataset, NDArray[np.int64], NDArray[np.floating]]:
     """A few photographs, from the first to the last."""
     import numpy as np
 
@@ -50,14 +52,14 @@ def _sampled(checked: Checked) -> tuple[xr.Dataset, NDArray[np.int64], NDArray[n
     return checked.dataset, numbers, images[numbers].values
 
 
-def _transposition_error(checked: Checked) -> float:
+def _transposition_error(checked: VersionUnderCheck) -> float:
     from pipelines.neural_btf.figures import transposition_error
 
     dataset, numbers, images = _sampled(checked)
     return transposition_error(dataset["abrdfs"][:, numbers].values, images)
 
 
-def _statistics_error(checked: Checked) -> float:
+def _statistics_error(checked: VersionUnderCheck) -> float:
     from pipelines.neural_btf.figures import statistics_error
 
     dataset, numbers, images = _sampled(checked)
@@ -157,7 +159,7 @@ def _cluster_pictures(dataset: xr.Dataset) -> Pictures:
     return {"clusters": cluster_map(dataset["ids"].values, height, width)}
 
 
-def _smallest_cluster(checked: Checked) -> float:
+def _smallest_cluster(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     dataset = checked.dataset
@@ -165,7 +167,7 @@ def _smallest_cluster(checked: Checked) -> float:
     return float(counted.min() if (counted == dataset["sizes"].values).all() else 0)
 
 
-def _spread_ratio(checked: Checked) -> float:
+def _spread_ratio(checked: VersionUnderCheck) -> float:
     from pipelines.neural_btf.figures import spread_ratio
 
     scores = checked.input("abrdf_matrix")["scores"].values

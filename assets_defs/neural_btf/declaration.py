@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from pydantic import Field
 
 from assets_defs.settings import Preset, Settings
-from assets_defs.system import Dimension, Source, System
+from assets_defs.sources import Source
+from assets_defs.system import Dimension, System
 from pipelines.virtual.cloth.weaves import MATERIALS
 from storage.readers.btf import open_btf
 from storage.versions import Slot, VersionedStore
@@ -87,31 +88,6 @@ def _check_material(source: Source, settings: Mapping[str, Any]) -> None:
         raise ValueError(f"crop is set for {source.name}; expected a BTF of yours.")
 
 
-def _check_sizes(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """Refuse more clusters than texels, and too deep an encoder, before anything is made."""
-    if "clusters" not in sources:
-        return
-    taken_in, network = settings["btf_images"], settings["neural_btf"]
-    assert isinstance(taken_in, ImageSettings)
-    assert isinstance(network, NetworkSettings)
-    material, clusters = sources["material"], sources["clusters"].key
-    if material.path is None:
-        texels, images = taken_in.texels**2, taken_in.directions**2
-    else:
-        measured = open_btf(material.path, taken_in.crop)
-        texels, images = measured.height * measured.width, measured.images
-    if clusters != NONE and int(clusters) > texels:
-        raise ValueError(
-            f"{material.name}: clusters is {clusters}; expected at most {texels}, the number of "
-            "texels."
-        )
-    if 3 ** len(network.widths) > images or any(width < 1 for width in network.widths):
-        raise ValueError(
-            f"{material.name}: widths is {network.widths}; expected fewer positive numbers, as "
-            f"every block leaves a third of {images} photographs."
-        )
-
-
 def _wall(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
     """The materials side by side under the moving light, one wall for each number of clusters."""
     from pipelines.neural_btf.pictures import wall
@@ -151,6 +127,31 @@ BTF = System(
             check=lambda source, settings: None,
         ),
     ),
-    check=_check_sizes,
     overview=_wall,
 )
+
+
+@BTF.before_work
+def _check_sizes(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    """Refuse more clusters than texels, and too deep an encoder, before anything is made."""
+    if "clusters" not in sources:
+        return
+    taken_in, network = settings["btf_images"], settings["neural_btf"]
+    assert isinstance(taken_in, ImageSettings)
+    assert isinstance(network, NetworkSettings)
+    material, clusters = sources["material"], sources["clusters"].key
+    if material.path is None:
+        texels, images = taken_in.texels**2, taken_in.directions**2
+    else:
+        measured = open_btf(material.path, taken_in.crop)
+        texels, images = measured.height * measured.width, measured.images
+    if clusters != NONE and int(clusters) > texels:
+        raise ValueError(
+            f"{material.name}: clusters is {clusters}; expected at most {texels}, the number of "
+            "texels."
+        )
+    if 3 ** len(network.widths) > images or any(width < 1 for width in network.widths):
+        raise ValueError(
+            f"{material.name}: widths is {network.widths}; expected fewer positive numbers, as "
+            f"every block leaves a third of {images} photographs."
+        )

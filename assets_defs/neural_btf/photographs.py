@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.neural_btf.datasets import (
     pairs_of,
 )
 from assets_defs.neural_btf.declaration import BTF, ImageSettings
-from assets_defs.system import Metadata, Source
+from assets_defs.sources import Source
+from assets_defs.system import Metadata
 from storage.readers.btf import open_btf
 from storage.schemas import neural_btf as schemas
 
@@ -32,18 +33,18 @@ def _image_pictures(dataset: xr.Dataset) -> Pictures:
     return {"photographs": photograph_sheet(shown.values)}
 
 
-def _missing_pairs(checked: Checked) -> float:
+def _missing_pairs(checked: VersionUnderCheck) -> float:
     from pipelines.neural_btf.figures import missing_pairs
 
     return missing_pairs(pairs_of(checked.dataset))
 
 
-def _dark_share(checked: Checked) -> float:
+def _dark_share(checked: VersionUnderCheck) -> float:
     images = checked.dataset["images"]
     return float((images.max(dim=("y", "x", "channel")) <= 0).mean().compute())
 
 
-def _mean_radiance(checked: Checked) -> float:
+def _mean_radiance(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["images"].mean(dtype="float64").compute())
 
 

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.neural_btf.datasets import (
     compressed,
     pairs_of,
     reader,
 )
 from assets_defs.neural_btf.declaration import BTF, NONE
-from assets_defs.pictures import table
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Metadata
 from storage.schemas import neural_btf as schemas
@@ -53,11 +52,11 @@ def _restored_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _rmse(checked: Checked) -> float:
+def _rmse(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["rmse"])
 
 
-def _rmse_over_none(checked: Checked) -> float | None:
+def _rmse_over_none(checked: VersionUnderCheck) -> float | None:
     """Against the same material's version without clusters, if it was made alike."""
     from storage.errors import NoVersionError
 
@@ -83,8 +82,8 @@ def _rmse_over_none(checked: Checked) -> float | None:
     return float(checked.dataset["rmse"]) / without if alike[0] == alike[1] else None
 
 
-def _worst(name: str) -> Callable[[Checked], float]:
-    def worst(checked: Checked) -> float:
+def _worst(name: str) -> Callable[[VersionUnderCheck], float]:
+    def worst(checked: VersionUnderCheck) -> float:
         return float(checked.dataset[name].max())
 
     return worst
@@ -182,7 +181,7 @@ def restored_images(
         }
         for number in (*chosen, worst)
     ]
-    return dataset, {"RMSE over alpha": errors.rmse, "pairs shown, and the worst": table(rows)}
+    return dataset, {"RMSE over alpha": errors.rmse, "pairs shown, and the worst": rows}
 
 
 # ---- cloth_frames ----------------------------------------------------------------------------
@@ -210,11 +209,11 @@ def _cloth_pictures(dataset: xr.Dataset) -> Pictures:
     return {"frames": contact_sheet(dataset["frames"].values[shown])}
 
 
-def _coverage(checked: Checked) -> float:
+def _coverage(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["coverage"])
 
 
-def _mean_brightness(checked: Checked) -> float:
+def _mean_brightness(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["frames"].values.mean() / 255.0)
 
 

@@ -1,10 +1,5 @@
 """Image-based lighting by SSDFs (docs/ssdf.md): the graph's assets and checks.
 
-`declaration` says what the assets are partitioned by; the other modules declare them, in the order
-of the graph.
+`declaration` says what the assets are partitioned by, the modules named in `graph` declare them in
+the order of the graph, `datasets` goes between stored datasets and the objects of `pipelines`.
 """
-
-from assets_defs.ssdf_lighting import meshes, visibility, compression, lights, frames  # noqa: I001, F401
-from assets_defs.ssdf_lighting.declaration import SSDF
-
-__all__ = ["SSDF"]

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
@@ -74,7 +75,7 @@ def shared_basis_of(triangle_clusters: xr.Dataset) -> SharedBasis:
     )
 
 
-def _unused(checked: Checked) -> float:
+def _unused(checked: VersionUnderCheck) -> float:
     """Share of the cluster numbers up to the largest that have no triangle."""
     import numpy as np
 
@@ -84,7 +85,7 @@ def _unused(checked: Checked) -> float:
     return float((np.bincount(cluster) == 0).mean())
 
 
-def _compactness(checked: Checked) -> float:
+def _compactness(checked: VersionUnderCheck) -> float:
     from pipelines.ssdf_lighting.compression.triangle_clusters import (
         leading_coordinates,
         spread_inside,
@@ -98,7 +99,7 @@ def _compactness(checked: Checked) -> float:
     return spread_inside(features, mesh["triangles"].values, dataset["cluster"].values)
 
 
-def _basis_error(checked: Checked) -> float:
+def _basis_error(checked: VersionUnderCheck) -> float:
     """Error of the shared basis on sampled vertices, over the error it was made for."""
     import numpy as np
 
@@ -223,16 +224,18 @@ class BasisSettings(Settings):
     }
 
 
-def check_compression(
-    name: str,
-    vertices: int,
-    triangles: int,
-    directions: int,
-    clustering: Settings,
-    basis: Settings,
-) -> None:
+@SSDF.before_work
+def check_compression(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
     """Raises ValueError for more clusters than triangles, more values than rows, and an error
     below that of the shared basis."""
+    if "scene" not in sources or "ssdf_basis" not in settings:
+        return
+    from assets_defs.ssdf_lighting.meshes import check_size, counted
+
+    clustering, basis = settings["triangle_clusters"], settings["ssdf_basis"]
+    vertices, triangles = counted(sources["scene"], settings["scene_mesh"])
+    name = sources["scene"].name
+    directions = check_size(name, vertices, settings["visibility"])
     assert isinstance(clustering, ClusterSettings)
     assert isinstance(basis, BasisSettings)
     if clustering.clusters > triangles:
@@ -268,7 +271,9 @@ def decoder_of_basis(ssdf_basis: xr.Dataset, vertices: int) -> Decoder:
     return decoder_of_pca(pca, vertices)
 
 
-def _sample(checked: Checked) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+def _sample(
+    checked: VersionUnderCheck,
+) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
     """Vertex numbers, distances found and distances wanted of some vertices."""
     from pipelines.ssdf_lighting.compression.decoding import decoded_rows
     from pipelines.ssdf_lighting.figures import sampled_rows
@@ -279,7 +284,7 @@ def _sample(checked: Checked) -> tuple[NDArray[np.int64], NDArray[np.float32], N
     return rows, decoded_rows(decoder, rows), matrix[rows].values
 
 
-def _sampled_rmse(checked: Checked) -> float:
+def _sampled_rmse(checked: VersionUnderCheck) -> float:
     """Of sampled vertices, decoded here, over that of the same vertices when it was made."""
     import numpy as np
 
@@ -292,11 +297,11 @@ def _sampled_rmse(checked: Checked) -> float:
     return float(rmse / max(np.sqrt((stored**2).mean()), 1e-12))
 
 
-def _rmse(checked: Checked) -> float:
+def _rmse(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["rmse"])
 
 
-def _over_budget(checked: Checked) -> float:
+def _over_budget(checked: VersionUnderCheck) -> float:
     """What was asked for over what was reached: bytes, or error."""
     settings, dataset = checked.record["settings"], checked.dataset
     if settings["coding"] == "paper":
@@ -306,15 +311,15 @@ def _over_budget(checked: Checked) -> float:
     return float(dataset["rmse"] / settings["rmse"])
 
 
-def _byte_share(checked: Checked) -> float:
+def _byte_share(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["bytes_memory"] / checked.dataset["bytes_raw"])
 
 
-def _wrong_visibility(checked: Checked) -> float:
+def _wrong_visibility(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["wrong_visibility"])
 
 
-def _border_step(checked: Checked) -> float:
+def _border_step(checked: VersionUnderCheck) -> float:
     """Steps of the error across borders of clusters over those inside, some directions."""
     import numpy as np
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.settings import Settings
-from assets_defs.system import Dimension, Source, System
+from assets_defs.sources import Source
+from assets_defs.system import Dimension, System
 from storage.readers.environments import read_environment
 from storage.readers.scenes import read_scene
 from storage.versions import Slot, VersionedStore
@@ -28,21 +28,6 @@ def _check_scene(source: Source, settings: Mapping[str, Any]) -> None:
 def _check_environment(source: Source, settings: Mapping[str, Any]) -> None:
     if source.path is not None:
         read_environment(source.path)
-
-
-def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """Sizes and bytes, before any ray is traced."""
-    if "scene" not in sources or "ssdf_basis" not in settings:
-        return
-    from assets_defs.ssdf_lighting.compression import check_compression
-    from assets_defs.ssdf_lighting.meshes import check_size, counted
-
-    vertices, triangles = counted(sources["scene"], settings["scene_mesh"])
-    name = sources["scene"].name
-    directions = check_size(name, vertices, settings["visibility"])
-    check_compression(
-        name, vertices, triangles, directions, settings["triangle_clusters"], settings["ssdf_basis"]
-    )
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
@@ -87,6 +72,5 @@ SSDF = System(
             check=_check_environment,
         ),
     ),
-    check=_check_together,
     overview=_overview,
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
 from assets_defs.ssdf_lighting.compression import decoder_of_basis, distance_blocks
 from assets_defs.ssdf_lighting.declaration import SSDF
@@ -64,7 +64,7 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _psnr(checked: Checked, reference: str) -> float:
+def _psnr(checked: VersionUnderCheck, reference: str) -> float:
     from pipelines.ssdf_lighting.drawing.frames import psnr
 
     dataset = checked.dataset
@@ -73,21 +73,21 @@ def _psnr(checked: Checked, reference: str) -> float:
     )
 
 
-def _relit_psnr(checked: Checked) -> float:
+def _relit_psnr(checked: VersionUnderCheck) -> float:
     return _psnr(checked, "uncompressed")
 
 
-def _reference_psnr(checked: Checked) -> float:
+def _reference_psnr(checked: VersionUnderCheck) -> float:
     return _psnr(checked, "reference")
 
 
-def _mean_brightness(checked: Checked) -> float:
+def _mean_brightness(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     shown = dataset["frames"].values[:, dataset["covered"].values > 0.999]
     return float(shown.astype("float64").mean() / 255.0)
 
 
-def _coverage(checked: Checked) -> float:
+def _coverage(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["covered"].values.mean())
 
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Metadata, Source
+from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
 
 if TYPE_CHECKING:
@@ -50,20 +51,20 @@ def lights_of(environment_lights: xr.Dataset) -> Lights:
     return Lights(*(environment_lights[name].values for name in names))
 
 
-def _flux_error(checked: Checked) -> float:
+def _flux_error(checked: VersionUnderCheck) -> float:
     from pipelines.ssdf_lighting.light.environment_fit import flux_error
 
     return flux_error(lights_of(checked.dataset), checked.dataset["radiance"].values)
 
 
-def _irradiance_error(checked: Checked) -> float:
+def _irradiance_error(checked: VersionUnderCheck) -> float:
     from pipelines.ssdf_lighting.light.environment_fit import judged
 
     dataset = checked.dataset
     return judged(lights_of(dataset), dataset["radiance"].values).irradiance_error
 
 
-def _tone_error(checked: Checked) -> float:
+def _tone_error(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["tone_error"])
 
 

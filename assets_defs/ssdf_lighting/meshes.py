@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Metadata, Source
+from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def scene_of(scene_mesh: xr.Dataset) -> Scene:
     )
 
 
-def _normal_error(checked: Checked) -> float:
+def _normal_error(checked: VersionUnderCheck) -> float:
     """Share of the triangle corners whose normal looks to the other side of the triangle."""
     import numpy as np
 
@@ -124,7 +125,7 @@ def _normal_error(checked: Checked) -> float:
     return float((along < 0).mean())
 
 
-def _area(checked: Checked) -> float:
+def _area(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     dataset = checked.dataset

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.ssdf_lighting.meshes import scene_of
@@ -45,7 +45,7 @@ class VisibilitySettings(Settings):
     }
 
 
-def _visibility_error(checked: Checked) -> float:
+def _visibility_error(checked: VersionUnderCheck) -> float:
     from pipelines.ssdf_lighting.figures import visibility_error
 
     scene = scene_of(checked.input("scene_mesh"))
@@ -60,7 +60,7 @@ def _visibility_error(checked: Checked) -> float:
     )
 
 
-def _visible_share(checked: Checked) -> float:
+def _visible_share(checked: VersionUnderCheck) -> float:
     """Of the sphere, mean of the vertices."""
     import numpy as np
 
@@ -178,7 +178,7 @@ class MatrixSettings(Settings):
     )
 
 
-def _distance_error(checked: Checked) -> float:
+def _distance_error(checked: VersionUnderCheck) -> float:
     from pipelines.ssdf_lighting.figures import distance_error, sampled_rows
 
     seen = checked.input("visibility")
@@ -190,7 +190,7 @@ def _distance_error(checked: Checked) -> float:
     )
 
 
-def _sign_error(checked: Checked) -> float:
+def _sign_error(checked: VersionUnderCheck) -> float:
     """Share of all distances whose sign is not that of the visibility."""
     import numpy as np
 

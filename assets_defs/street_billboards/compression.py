@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
-from assets_defs.pictures import table
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Settings
+from assets_defs.sources import Source
 from assets_defs.street_billboards.datasets import (
     compressed_of,
     compressed_variables,
@@ -19,7 +19,7 @@ from assets_defs.street_billboards.datasets import (
     views_of,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata, Source
+from assets_defs.system import Metadata
 from storage.schemas import street_billboards as schemas
 
 if TYPE_CHECKING:
@@ -38,13 +38,17 @@ _LEAST_WIDTH = 5.0
 """Metres of a road."""
 
 
-def check_bytes(source: Source, settings: Mapping[str, Settings]) -> None:
+@STREET.before_work
+def check_bytes(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
     """Whether the atlases' budget could hold the street's textures. Raises ValueError.
 
     A road is five metres wide at least; how many billboards there are is not known before.
     """
+    if "drive" not in sources or "texture_atlases" not in settings:
+        return
     from assets_defs.street_billboards.drive import metres_of
 
+    source = sources["drive"]
     voxel = settings["billboards"].model_dump()["voxel"]
     eigen, budget = settings["eigen_textures"].model_dump(), settings["texture_atlases"]
     each = _LEAST_BYTES
@@ -86,30 +90,30 @@ def _eigen_pictures(dataset: xr.Dataset) -> Pictures:
     return {"eigen-images": eigen_sheet(compressed_of(dataset))}
 
 
-def _over_budget(checked: Checked) -> float:
+def _over_budget(checked: VersionUnderCheck) -> float:
     """Error over the error asked for; of the paper's form, over a grey level of 8 bit noise."""
     settings = checked.record["settings"]
     asked = settings["error"] if settings["coding"] == "compact" else 8.0
     return _decoded_rmse(checked) / float(asked)
 
 
-def _decoded_rmse(checked: Checked) -> float:
+def _decoded_rmse(checked: VersionUnderCheck) -> float:
     """Of some two hundred billboards, decoded anew."""
     from pipelines.street_billboards.textures.figures import decoded_rmse
 
     return decoded_rmse(views_of(checked.input("view_textures")), compressed_of(checked.dataset))
 
 
-def _sampled_rmse(checked: Checked) -> float:
+def _sampled_rmse(checked: VersionUnderCheck) -> float:
     return _decoded_rmse(checked) / max(float(checked.dataset["rmse"]), 1e-9)
 
 
-def _byte_share(checked: Checked) -> float:
+def _byte_share(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return float(dataset["bytes"]) / (RAW_BYTES * max(dataset.sizes["billboard"], 1))
 
 
-def _excess_rank(checked: Checked) -> float:
+def _excess_rank(checked: VersionUnderCheck) -> float:
     """By how much a billboard has more eigen-images than observed views, at most."""
     import numpy as np
 
@@ -187,9 +191,7 @@ def eigen_textures(
     )
     count = max(len(turns), 1)
     return dataset, {
-        "bytes": table(
-            [{"part": part, "bytes a billboard": n / count} for part, n in counts.items()]
-        ),
+        "bytes": [{"part": part, "bytes a billboard": n / count} for part, n in counts.items()],
         "bytes a billboard": counts["total"] / count,
         "PSNR of textures, dB": psnr,
     }
@@ -213,7 +215,7 @@ def _atlas_pictures(dataset: xr.Dataset) -> Pictures:
     return {"detail": atlas_picture(pages_of(dataset)[0])}
 
 
-def _unpacked_error(checked: Checked) -> float:
+def _unpacked_error(checked: VersionUnderCheck) -> float:
     """Largest difference of sampled billboards read from the pages and decoded, in codes."""
     from pipelines.street_billboards.textures.figures import unpacked_error
 
@@ -221,7 +223,7 @@ def _unpacked_error(checked: Checked) -> float:
     return unpacked_error(pages_of(checked.dataset), compressed_of(stored))
 
 
-def _bytes_a_metre(checked: Checked) -> float:
+def _bytes_a_metre(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     from pipelines.street_billboards.billboards import HEADER_BYTES
@@ -238,7 +240,7 @@ def _metres(places: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
-def _padding_share(checked: Checked) -> float:
+def _padding_share(checked: VersionUnderCheck) -> float:
     dataset = checked.dataset
     return float(dataset["padding"]) / float(dataset["padding"] + dataset["bytes"])
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.settings import Settings
-from assets_defs.system import Dimension, Source, System
+from assets_defs.sources import Source
+from assets_defs.street_billboards.drive_agreement import check_agreement
+from assets_defs.system import Dimension, System
 from storage.readers.drives import read_drive
 from storage.versions import Slot, VersionedStore
 
@@ -20,17 +21,7 @@ CITY = "city"
 def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
     """Everything but the pixels; then a few frames, whether they show one world."""
     if source.path is not None:
-        from assets_defs.street_billboards.drive import check_agreement
-
         check_agreement(read_drive(source.path), source.name)
-
-
-def _check_together(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """The bytes of the textures, before any work."""
-    if "drive" in sources and "texture_atlases" in settings:
-        from assets_defs.street_billboards.compression import check_bytes
-
-        check_bytes(sources["drive"], settings)
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
@@ -56,6 +47,5 @@ STREET = System(
             folders=True,
         ),
     ),
-    check=_check_together,
     overview=_overview,
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Settings
 from assets_defs.street_billboards.datasets import frame_views
 from assets_defs.street_billboards.declaration import STREET
@@ -52,7 +52,7 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _stereo_bad(checked: Checked) -> float:
+def _stereo_bad(checked: VersionUnderCheck) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
     from pipelines.street_billboards.capture.depth_refinement import filled
     from pipelines.street_billboards.capture.stereo import bad_share, match
@@ -63,7 +63,7 @@ def _stereo_bad(checked: Checked) -> float:
     return bad_share(filled(found.disparity, pair.left), pair.disparity)
 
 
-def _depth_error(checked: Checked) -> float | None:
+def _depth_error(checked: VersionUnderCheck) -> float | None:
     """Against the true depth of held-out frames, which are matched for this alone."""
     from pipelines.street_billboards.capture.stereo import depth_maps
     from pipelines.street_billboards.capture.stereo_figures import depth_error
@@ -83,7 +83,7 @@ def _depth_error(checked: Checked) -> float | None:
     return depth_error(maps.depth[len(maps.depth) // 2], drive["truth_depth"][0].values)
 
 
-def _known_share(checked: Checked) -> float:
+def _known_share(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     return float(np.isfinite(checked.dataset["depth"]).mean().compute())
@@ -197,11 +197,11 @@ def _point_pictures(dataset: xr.Dataset) -> Pictures:
     return {"points": points_picture(dataset["positions"].values, dataset["colours"].values)}
 
 
-def _agreement(checked: Checked) -> float:
+def _agreement(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["agreement"].mean(skipna=True))
 
 
-def _points_a_metre(checked: Checked) -> float:
+def _points_a_metre(checked: VersionUnderCheck) -> float:
     import numpy as np
 
     places = checked.input("drive_frames")["poses"].values[:, 0, :3, 3]
@@ -209,7 +209,7 @@ def _points_a_metre(checked: Checked) -> float:
     return checked.dataset.sizes["point"] / way
 
 
-def _stray_share(checked: Checked) -> float | None:
+def _stray_share(checked: VersionUnderCheck) -> float | None:
     """Against the true depth of held-out frames: a point before it hangs in the air."""
     from pipelines.street_billboards.capture.stereo_figures import stray_share
 
@@ -225,7 +225,7 @@ def _stray_share(checked: Checked) -> float | None:
     )
 
 
-def _gain_step(checked: Checked) -> float:
+def _gain_step(checked: VersionUnderCheck) -> float:
     """Evened out, neighbouring photographs should agree: what is left, as a factor less one."""
     import numpy as np
 

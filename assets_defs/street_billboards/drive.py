@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata, Source
+from assets_defs.system import Metadata
 from storage.readers.drives import Drive, read_drive, read_frame
 from storage.schemas import street_billboards as schemas
 
@@ -27,8 +28,6 @@ OFFSETS = (1.0, 2.0, 3.0)
 EXPOSURE = 0.95
 """From the simulated city's radiance to pictures."""
 HELD_OUT_EVERY, HELD_OUT_FIRST = 10, 5
-LEAST_AGREEMENT = 0.3
-"""Share of points that neighbouring frames confirm; wrong calibrations leave a tenth."""
 
 
 class DriveSettings(Settings):
@@ -53,31 +52,6 @@ class DriveSettings(Settings):
         "test": {"frames": 9, "width": 256},
         "paper": {"frames": 100},
     }
-
-
-def check_agreement(drive: Drive, name: str) -> None:
-    """Whether three frames in the middle of a drive show one world. Raises ValueError."""
-    import numpy as np
-
-    from pipelines.street_billboards.capture.point_fusion import FrameViews, agreement
-    from pipelines.street_billboards.capture.stereo import depth_maps
-
-    middle = min(max(len(drive.times) // 2, 1), len(drive.times) - 2)
-    views = []
-    for frame in (middle - 1, middle, middle + 1):
-        pictures = read_frame(drive, frame)
-        maps = depth_maps(pictures, drive.intrinsics, drive.poses[frame])
-        views.append(
-            FrameViews(maps.depth, maps.deviation, pictures, drive.intrinsics, drive.poses[frame])
-        )
-    before, _, after = (view._asdict() for view in views)
-    beside = FrameViews(**{name: np.concatenate([before[name], after[name]]) for name in before})
-    found = agreement(views[1], beside)
-    if found < LEAST_AGREEMENT:
-        raise ValueError(
-            f"{name}: of the points of time {drive.times[middle]:g} the frames beside it confirm "
-            f"{found:.0%}; expected {LEAST_AGREEMENT:.0%} at least: intrinsics or poses are wrong."
-        )
 
 
 def metres_of(source: Source, settings: Settings) -> float:
@@ -106,13 +80,13 @@ def _drive_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _spread(checked: Checked) -> float:
+def _spread(checked: VersionUnderCheck) -> float:
     """How much the photographs' mean codes differ, relative."""
     means = checked.dataset["photographs"].mean(dim=("y", "x", "channel"), dtype="float64").values
     return float(means.std() / means.mean())
 
 
-def _detail(checked: Checked) -> float:
+def _detail(checked: VersionUnderCheck) -> float:
     """Mean difference of neighbouring pixels' codes: what stereo lives on."""
     import numpy as np
 
@@ -121,7 +95,7 @@ def _detail(checked: Checked) -> float:
     return float(np.abs(np.diff(greys, axis=-1)).mean())
 
 
-def _way(checked: Checked) -> float:
+def _way(checked: VersionUnderCheck) -> float:
     """Median metres from frame to frame."""
     import numpy as np
 

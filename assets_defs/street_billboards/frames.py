@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, Checked
+from assets_defs.checks import Check, VersionUnderCheck
 from assets_defs.settings import Preset, Settings
 from assets_defs.street_billboards.datasets import billboards_of, compressed_of, pages_of
 from assets_defs.street_billboards.declaration import STREET
@@ -63,11 +63,11 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _mean(name: str) -> Callable[[Checked], float]:
+def _mean(name: str) -> Callable[[VersionUnderCheck], float]:
     return lambda checked: float(checked.dataset[name].mean())
 
 
-def _psnr_anew(checked: Checked) -> float:
+def _psnr_anew(checked: VersionUnderCheck) -> float:
     """From the stored pictures."""
     import numpy as np
 
@@ -80,11 +80,11 @@ def _psnr_anew(checked: Checked) -> float:
     return float(np.mean([psnr(*one) for one in pictures]))
 
 
-def _coverage(checked: Checked) -> float:
+def _coverage(checked: VersionUnderCheck) -> float:
     return float(checked.dataset["covered"].mean())
 
 
-def _shader_difference(checked: Checked) -> float:
+def _shader_difference(checked: VersionUnderCheck) -> float:
     """Share of the pixels in which shader and processor differ by more than a grey level."""
     import numpy as np
 

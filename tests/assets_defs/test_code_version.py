@@ -224,7 +224,7 @@ def test_a_version_is_a_short_hexadecimal_hash() -> None:
 
 
 def test_assets_of_the_graph_have_versions_of_their_own() -> None:
-    from assets_defs.definitions import SYSTEMS
+    from assets_defs.systems import SYSTEMS
 
     system: System
     for system in SYSTEMS.values():

@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from assets_defs.definitions import SYSTEMS
-from assets_defs.glass_scratches import SCRATCHES
+from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
-from assets_defs.neural_btf import BTF
+from assets_defs.neural_btf.graph import BTF
 from assets_defs.photo_fur import FUR
-from assets_defs.ssdf_lighting import SSDF
-from assets_defs.street_billboards import STREET
+from assets_defs.ssdf_lighting.graph import SSDF
+from assets_defs.street_billboards.graph import STREET
 from assets_defs.system import Source, System, partition_key
+from assets_defs.systems import SYSTEMS
 from storage.schemas import schemas_of
 from storage.versions import Slot
 from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
@@ -198,9 +198,9 @@ def test_what_has_lost_its_file_is_not_made_again(dropped: Any) -> None:
     (path,) = dropped.workspace.inbox("photo_fur").iterdir()
     key = Source.of(path).key
     dropped.launcher.launch(Request(FUR, [{"photo": key}, {"photo": "grass"}], "test"))
-    assert {"photo": key} in FUR.made(dropped.workspace)
+    assert {"photo": key} in FUR.stored_partitions(dropped.workspace)
     path.unlink()
-    assert FUR.made(dropped.workspace) == [{"photo": "grass"}] * 3
+    assert FUR.stored_partitions(dropped.workspace) == [{"photo": "grass"}] * 3
 
 
 def _materialisations(house: Any) -> dict[str, int]:

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from assets_defs.glass_scratches import SCRATCHES
+from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.launcher import Request
-from assets_defs.system import Source
+from assets_defs.sources import Source
 from pipelines.drawing import colour
 from pipelines.geometry import solids
 from pipelines.glass_scratches.drawing import frames

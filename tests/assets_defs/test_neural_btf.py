@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import LaunchError, Request
-from assets_defs.neural_btf import BTF
 from assets_defs.neural_btf import network as network_assets
 from assets_defs.neural_btf.datasets import payload_bytes
+from assets_defs.neural_btf.graph import BTF
 from pipelines import clustering, lowrank
 from pipelines.light import directions
 from pipelines.neural_btf import abrdf, compressed, panel, representatives, training

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import Request
-from assets_defs.neural_btf import BTF
 from assets_defs.neural_btf.datasets import payload_bytes
+from assets_defs.neural_btf.graph import BTF
 
 MATERIAL = {"material": "silk"}
 SHORT = {"steps": 300, "encoder_steps": 20, "texels": 100}

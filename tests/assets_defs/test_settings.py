@@ -10,8 +10,9 @@ import dagster as dg
 import pytest
 from pydantic import Field, ValidationError, field_validator
 
-from assets_defs.definitions import SYSTEMS
-from assets_defs.settings import PRESETS, Preset, Settings, SettingsError, config_class, resolve
+from assets_defs.dagster_settings import config_class
+from assets_defs.settings import PRESETS, Preset, Settings, SettingsError, resolve
+from assets_defs.systems import SYSTEMS
 
 
 class Sample(Settings):

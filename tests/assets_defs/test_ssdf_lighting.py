@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import Request
-from assets_defs.ssdf_lighting import SSDF
-from assets_defs.system import Source
+from assets_defs.sources import Source
+from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines import lowrank
 from pipelines.geometry import shapes
 from pipelines.ssdf_lighting import figures, scene

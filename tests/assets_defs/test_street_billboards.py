@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import Request
-from assets_defs.street_billboards import STREET
+from assets_defs.sources import Source
 from assets_defs.street_billboards.datasets import compressed_of, pages_of, views_of
-from assets_defs.system import Source
+from assets_defs.street_billboards.graph import STREET
 from pipelines.street_billboards import billboards, figures, octree
 from pipelines.street_billboards.capture import exposure, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, frames, stage_view

@@ -1,11 +1,11 @@
-"""Pictures and tables for the web UI's metadata."""
+"""What an asset says of itself, as metadata of the web UI: thumbnails, tables."""
 
 from __future__ import annotations
 
 import base64
 import io
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import dagster as dg
 
@@ -15,6 +15,19 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 100_000
 _WIDEST = 512
+
+
+def dagster_metadata(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """An asset's metadata as Dagster takes them: lists of rows become tables, arrays thumbnails."""
+    return {name: _shown(value) for name, value in metadata.items()}
+
+
+def _shown(value: Any) -> Any:
+    if isinstance(value, list):
+        return _table(value)
+    if hasattr(value, "shape") and len(value.shape) >= 2:
+        return thumbnail(value)
+    return value
 
 
 def thumbnail(picture: NDArray[np.uint8]) -> dg.MarkdownMetadataValue:
@@ -35,7 +48,7 @@ def thumbnail(picture: NDArray[np.uint8]) -> dg.MarkdownMetadataValue:
     return dg.MetadataValue.md(f"![picture](data:image/jpeg;base64,{data})")
 
 
-def table(rows: Sequence[Mapping[str, int | float | str]]) -> dg.TableMetadataValue:
+def _table(rows: Sequence[Mapping[str, int | float | str]]) -> dg.TableMetadataValue:
     """Rows of equal columns as a table; fractions with four digits that count."""
     shown = [
         {
