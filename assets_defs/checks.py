@@ -9,39 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
-from storage.versions import Slot, VersionedStore
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-
-@dataclass(frozen=True)
-class VersionUnderCheck:
-    """What a figure is computed from: a version and the inputs it was made of."""
-
-    store: VersionedStore
-    slot: Slot
-    version: str
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """The version's record."""
-        return self.store.record(self.slot, self.version)
-
-    @property
-    def dataset(self) -> xr.Dataset:
-        """The version, lazy."""
-        return self.store.open(self.slot, self.version)
-
-    def input(self, asset: str) -> xr.Dataset:
-        """The version of an upstream asset that this one was made from, lazy."""
-        for entry in self.record["inputs"]:
-            if entry["asset"] == asset:
-                slot = Slot(self.slot.system, asset, entry["partition"])
-                return self.store.open(slot, entry["version"])
-        raise KeyError(f"{self.slot} was not made from {asset}.")
+from storage.stored_version import StoredVersion
 
 
 @dataclass(frozen=True)
@@ -50,7 +19,7 @@ class Check:
 
     name: str
     description: str
-    figure: Callable[[VersionUnderCheck], float | None]
+    figure: Callable[[StoredVersion], float | None]
     at_most: float | None = None
     at_least: float | None = None
     change: float | None = None
@@ -91,7 +60,7 @@ class Check:
         return None
 
 
-def figure_before(version: VersionUnderCheck, check: str) -> float | None:
+def figure_before(version: StoredVersion, check: str) -> float | None:
     """The check's figure in the last good version of equal settings, if there is one."""
     store, slot = version.store, version.slot
     pointer = store.pointer(slot)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import dagster as dg
 
-from assets_defs.checks import Check, VersionUnderCheck, figure_before
+from assets_defs.checks import Check, figure_before
 from assets_defs.dagster_metadata import dagster_metadata
 from assets_defs.dagster_settings import config_class
 from assets_defs.memory import give_back_freed_memory
@@ -19,6 +19,7 @@ from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
 from storage.errors import SchemaError
 from storage.io_manager import INTERRUPTED
+from storage.stored_version import StoredVersion
 from storage.versions import VersionedStore
 from storage.zarr_files import RECORD
 
@@ -155,15 +156,13 @@ def _dagster_check(
     def evaluate(context: dg.AssetCheckExecutionContext) -> dg.AssetCheckResult:
         store: VersionedStore = context.resources.workspace.store
         slot = system.slot(plan.name, keys_of_partition(context.partition_key, plan.by))
-        version = VersionUnderCheck(
-            store, slot, store.version_under_check(slot, context.run.run_id)
-        )
+        version = StoredVersion(store, slot, store.version_under_check(slot, context.run.run_id))
         return _evaluated(check, version)
 
     return evaluate
 
 
-def _evaluated(check: Check, version: VersionUnderCheck) -> dg.AssetCheckResult:
+def _evaluated(check: Check, version: StoredVersion) -> dg.AssetCheckResult:
     """Compute the figure, note the verdict in the store, say it to Dagster."""
     store, slot = version.store, version.slot
     metadata: dict[str, Any] = {"version": version.version}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import Dimension, Metadata, System
@@ -17,6 +17,7 @@ from pipelines.photo_fur.drawing import Fill
 from storage.readers.meshes import read_mesh
 from storage.readers.photographs import BUILTIN_PHOTOGRAPHS, read_photograph
 from storage.schemas import photo_fur as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -97,11 +98,11 @@ def _photo_pictures(dataset: xr.Dataset) -> Pictures:
     return {"photograph": to_8bit(dataset["radiance"].values)}
 
 
-def _contrast(checked: VersionUnderCheck) -> float:
+def _contrast(checked: StoredVersion) -> float:
     return figures.contrast(checked.dataset["luminance"].values)
 
 
-def _clipped_share(checked: VersionUnderCheck) -> float:
+def _clipped_share(checked: StoredVersion) -> float:
     return figures.clipped_share(checked.dataset["radiance"].values)
 
 
@@ -201,12 +202,12 @@ def _attenuation_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _kept_share(checked: VersionUnderCheck) -> float:
+def _kept_share(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return float(dataset["pixels_per_layer"].sum() / dataset["histogram"].sum())
 
 
-def _decay_error(checked: VersionUnderCheck) -> float:
+def _decay_error(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return figures.decay_error(
         dataset["boundary_luminance"].values,
@@ -215,7 +216,7 @@ def _decay_error(checked: VersionUnderCheck) -> float:
     )
 
 
-def _depth_rank_correlation(checked: VersionUnderCheck) -> float | None:
+def _depth_rank_correlation(checked: StoredVersion) -> float | None:
     dataset = checked.dataset
     if "depth_rank_correlation" not in dataset:
         return None
@@ -316,12 +317,12 @@ def _stack_pictures(dataset: xr.Dataset) -> Pictures:
     return {"layers": layer_picture(dataset["layer"].values, dataset.sizes["shell"])}
 
 
-def _partition_error(checked: VersionUnderCheck) -> float:
+def _partition_error(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return figures.partition_error(dataset["layer"].values, dataset["mask"].values)
 
 
-def _interval_error(checked: VersionUnderCheck) -> float:
+def _interval_error(checked: StoredVersion) -> float:
     settings = checked.record["settings"]
     return figures.interval_error(
         checked.dataset["layer"].values,
@@ -399,14 +400,14 @@ class MeshSettings(Settings):
         return cls(layers=8 if keys["mesh"] == SQUARE else 15)
 
 
-def _step_error(checked: VersionUnderCheck) -> float:
+def _step_error(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return figures.step_error(
         dataset["vertices"].values, dataset["normals"].values, float(dataset["thickness"])
     )
 
 
-def _stretch(checked: VersionUnderCheck) -> float:
+def _stretch(checked: StoredVersion) -> float:
     from pipelines.geometry.shapes import texture_stretch
 
     dataset = checked.dataset.load()
@@ -506,7 +507,7 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     return {"frames": contact_sheet(dataset["frames"].values)}
 
 
-def _top_view_rmse(checked: VersionUnderCheck) -> float | None:
+def _top_view_rmse(checked: StoredVersion) -> float | None:
     from pipelines.photo_fur.frames import top_view_error
 
     from_above = checked.dataset["elevation"].values == 90.0
@@ -516,11 +517,11 @@ def _top_view_rmse(checked: VersionUnderCheck) -> float | None:
     return top_view_error(picture, checked.input("fur_photo")["radiance"].values)
 
 
-def _least_coverage(checked: VersionUnderCheck) -> float:
+def _least_coverage(checked: StoredVersion) -> float:
     return float(checked.dataset["coverage"].min())
 
 
-def _mean_brightness(checked: VersionUnderCheck) -> float:
+def _mean_brightness(checked: StoredVersion) -> float:
     return float(checked.dataset["frames"].astype("float64").mean() / 255.0)
 
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import ENVIRONMENTS, SCRATCHES
 from assets_defs.settings import Preset, Settings, UserFile
 from assets_defs.sources import Source
 from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,7 +47,7 @@ class ObjectSettings(Settings):
     }
 
 
-def _edge_error(checked: VersionUnderCheck) -> float:
+def _edge_error(checked: StoredVersion) -> float:
     """Share of the edges without exactly two triangles of opposite senses."""
     import numpy as np
 
@@ -56,7 +57,7 @@ def _edge_error(checked: VersionUnderCheck) -> float:
     return float(1 - np.isin(one * count + other, other * count + one).mean())
 
 
-def _volume(checked: VersionUnderCheck) -> float:
+def _volume(checked: StoredVersion) -> float:
     return float(checked.dataset["volume"])
 
 
@@ -196,35 +197,35 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _not_finite(checked: VersionUnderCheck) -> float:
+def _not_finite(checked: StoredVersion) -> float:
     import numpy as np
 
     radiance = checked.dataset["radiance"].values
     return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))
 
 
-def _furnace_excess(checked: VersionUnderCheck) -> float:
+def _furnace_excess(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import brightest_excess
 
     dataset = checked.dataset
     return brightest_excess(dataset["furnace"].values, dataset["furnace_error"].values)
 
 
-def _furnace_loss(checked: VersionUnderCheck) -> float:
+def _furnace_loss(checked: StoredVersion) -> float:
     return float(1 - checked.dataset["furnace"].values.mean())
 
 
-def _mean_brightness(checked: VersionUnderCheck) -> float:
+def _mean_brightness(checked: StoredVersion) -> float:
     return float(checked.dataset["frames"].values.mean() / 255.0)
 
 
-def _stage_brightness(checked: VersionUnderCheck) -> float:
+def _stage_brightness(checked: StoredVersion) -> float:
     """Mean of the stage's pictures over that of the traced ones."""
     dataset = checked.dataset
     return float(dataset["stage"].values.mean() / dataset["frames"].values.mean())
 
 
-def _scratched_share(checked: VersionUnderCheck) -> float:
+def _scratched_share(checked: StoredVersion) -> float:
     return float(checked.dataset["scratched"].values[1].mean())
 
 

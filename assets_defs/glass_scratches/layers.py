@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -122,7 +123,7 @@ def _layer_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _coverage_error(checked: VersionUnderCheck) -> float | None:
+def _coverage_error(checked: StoredVersion) -> float | None:
     """Against what was asked for, or for a threshold against what Poisson points give."""
     import numpy as np
 
@@ -137,7 +138,7 @@ def _coverage_error(checked: VersionUnderCheck) -> float | None:
     return float(np.abs(found / wanted - 1).mean())
 
 
-def _map_z(checked: VersionUnderCheck) -> float:
+def _map_z(checked: StoredVersion) -> float:
     """RMS z-score of the maps' means over 8 x 8 blocks against the scratches sampled anew."""
     from pipelines.glass_scratches.figures import block_z_rms
     from pipelines.glass_scratches.layers.scratch_layers import coverage_maps

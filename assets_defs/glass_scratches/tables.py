@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import Metadata
 from storage.schemas import glass_scratches as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,12 +53,12 @@ def _profile_pictures(dataset: xr.Dataset) -> Pictures:
     return {"profile": profile_picture(dataset["points"].values)}
 
 
-def _aspect(checked: VersionUnderCheck) -> float:
+def _aspect(checked: StoredVersion) -> float:
     points = checked.dataset["points"].values
     return float(-points[:, 1].min() / (points[-1, 0] - points[0, 0]))
 
 
-def _opening_tilt(checked: VersionUnderCheck) -> float:
+def _opening_tilt(checked: StoredVersion) -> float:
     points = checked.dataset["points"].values
     return float(abs(points[[0, -1], 1]).max() + max(points[:, 1].max(), 0.0))
 
@@ -146,7 +147,7 @@ def _table_pictures(dataset: xr.Dataset) -> Pictures:
     return {"table": table_picture(dataset["rho"].values)}
 
 
-def _furnace_error(checked: VersionUnderCheck) -> float:
+def _furnace_error(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.tables.exact import leaving_share
 
     dataset = checked.dataset
@@ -154,7 +155,7 @@ def _furnace_error(checked: VersionUnderCheck) -> float:
     return float(abs(leaving + dataset["absorbed"].values - 1).max())
 
 
-def _reciprocity_error(checked: VersionUnderCheck) -> float:
+def _reciprocity_error(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import reciprocity_error
 
     return reciprocity_error(
@@ -162,7 +163,7 @@ def _reciprocity_error(checked: VersionUnderCheck) -> float:
     )
 
 
-def _paths_z(checked: VersionUnderCheck) -> float:
+def _paths_z(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import paths_z_rms
 
     settings = checked.record["settings"]
@@ -175,7 +176,7 @@ def _paths_z(checked: VersionUnderCheck) -> float:
     )
 
 
-def _across_error(checked: VersionUnderCheck) -> float:
+def _across_error(checked: StoredVersion) -> float:
     dataset = checked.dataset
     mean = dataset["across"].values.mean(axis=0, dtype="float64")
     rho = dataset["rho"].values
@@ -267,7 +268,7 @@ def _spatial_pictures(dataset: xr.Dataset) -> Pictures:
     return {"leans": lean_picture(dataset["factor"].values, dataset["gamma"].values)}
 
 
-def _sampler_p(checked: VersionUnderCheck) -> float:
+def _sampler_p(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import sampler_p_value
     from pipelines.glass_scratches.tables.sampling import lobe_of
 
@@ -282,7 +283,7 @@ def _sampler_p(checked: VersionUnderCheck) -> float:
     )
 
 
-def _interpolation_error(checked: VersionUnderCheck) -> float:
+def _interpolation_error(checked: StoredVersion) -> float:
     from pipelines.glass_scratches.tables.scratch_table import interpolation_error
 
     settings = checked.record["settings"]
@@ -290,7 +291,7 @@ def _interpolation_error(checked: VersionUnderCheck) -> float:
     return interpolation_error(bins, settings["refractive_index"], settings["fresnel"])["mean"]
 
 
-def _largest_share(checked: VersionUnderCheck) -> float:
+def _largest_share(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return float(dataset["share"].mean(dim="place").max())
 

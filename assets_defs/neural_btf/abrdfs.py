@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
     image_blocks,
 )
@@ -15,6 +15,7 @@ from assets_defs.neural_btf.declaration import BTF, NONE
 from assets_defs.settings import Settings
 from assets_defs.system import Metadata
 from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,13 +37,13 @@ class MatrixSettings(Settings):
     )
 
 
-def _explained(checked: VersionUnderCheck) -> float:
+def _explained(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return float((dataset["singular_values"] ** 2).sum() / dataset["total_variation"])
 
 
 def _sampled(
-    checked: VersionUnderCheck,
+    checked: StoredVersion,
 ) -> tuple[xr.Dataset, NDArray[np.int64], NDArray[np.floating]]:
     """A few photographs, from the first to the last."""
     import numpy as np
@@ -52,14 +53,14 @@ def _sampled(
     return checked.dataset, numbers, images[numbers].values
 
 
-def _transposition_error(checked: VersionUnderCheck) -> float:
+def _transposition_error(checked: StoredVersion) -> float:
     from pipelines.neural_btf.figures import transposition_error
 
     dataset, numbers, images = _sampled(checked)
     return transposition_error(dataset["abrdfs"][:, numbers].values, images)
 
 
-def _statistics_error(checked: VersionUnderCheck) -> float:
+def _statistics_error(checked: StoredVersion) -> float:
     from pipelines.neural_btf.figures import statistics_error
 
     dataset, numbers, images = _sampled(checked)
@@ -159,7 +160,7 @@ def _cluster_pictures(dataset: xr.Dataset) -> Pictures:
     return {"clusters": cluster_map(dataset["ids"].values, height, width)}
 
 
-def _smallest_cluster(checked: VersionUnderCheck) -> float:
+def _smallest_cluster(checked: StoredVersion) -> float:
     import numpy as np
 
     dataset = checked.dataset
@@ -167,7 +168,7 @@ def _smallest_cluster(checked: VersionUnderCheck) -> float:
     return float(counted.min() if (counted == dataset["sizes"].values).all() else 0)
 
 
-def _spread_ratio(checked: VersionUnderCheck) -> float:
+def _spread_ratio(checked: StoredVersion) -> float:
     from pipelines.neural_btf.figures import spread_ratio
 
     scores = checked.input("abrdf_matrix")["scores"].values

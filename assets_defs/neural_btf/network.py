@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
     compressed,
     pairs_of,
@@ -16,6 +16,7 @@ from assets_defs.neural_btf.declaration import BTF, NetworkSettings
 from assets_defs.settings import Settings
 from assets_defs.system import Metadata
 from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
 from storage.work_state import WorkState
 
 if TYPE_CHECKING:
@@ -40,13 +41,13 @@ def _curve_pictures(dataset: xr.Dataset) -> Pictures:
     return {"loss": loss_curve(dataset["curve_step"].values, dataset["curve_rmse"].values)}
 
 
-def _loss_ratio(checked: VersionUnderCheck) -> float:
+def _loss_ratio(checked: StoredVersion) -> float:
     curve = checked.dataset["curve_rmse"].values
     tenth = max(1, len(curve) // 10)
     return float(curve[-tenth:].mean() / curve[:tenth].mean())
 
 
-def _encoder_residual(checked: VersionUnderCheck) -> float | None:
+def _encoder_residual(checked: StoredVersion) -> float | None:
     dataset = checked.dataset
     return float(dataset["encoder_residual"]) if "encoder_residual" in dataset else None
 
@@ -182,7 +183,7 @@ class PackSettings(Settings):
     """Nothing to choose: the payload is the paper's."""
 
 
-def _bytes_over_table(checked: VersionUnderCheck) -> float:
+def _bytes_over_table(checked: StoredVersion) -> float:
     from pipelines.neural_btf.figures import table_bytes
 
     dataset = checked.dataset
@@ -190,7 +191,7 @@ def _bytes_over_table(checked: VersionUnderCheck) -> float:
     return abs(payload_bytes(dataset) - table_bytes(dataset.sizes["cluster"], texels))
 
 
-def _decoding_error(checked: VersionUnderCheck) -> float:
+def _decoding_error(checked: StoredVersion) -> float:
     """Largest step between the stored form's and the trained network's values, 64 texels."""
     import numpy as np
 

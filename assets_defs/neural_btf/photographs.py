@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
     pairs_of,
 )
@@ -14,6 +14,7 @@ from assets_defs.sources import Source
 from assets_defs.system import Metadata
 from storage.readers.btf import open_btf
 from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,18 +34,18 @@ def _image_pictures(dataset: xr.Dataset) -> Pictures:
     return {"photographs": photograph_sheet(shown.values)}
 
 
-def _missing_pairs(checked: VersionUnderCheck) -> float:
+def _missing_pairs(checked: StoredVersion) -> float:
     from pipelines.neural_btf.figures import missing_pairs
 
     return missing_pairs(pairs_of(checked.dataset))
 
 
-def _dark_share(checked: VersionUnderCheck) -> float:
+def _dark_share(checked: StoredVersion) -> float:
     images = checked.dataset["images"]
     return float((images.max(dim=("y", "x", "channel")) <= 0).mean().compute())
 
 
-def _mean_radiance(checked: VersionUnderCheck) -> float:
+def _mean_radiance(checked: StoredVersion) -> float:
     return float(checked.dataset["images"].mean(dtype="float64").compute())
 
 

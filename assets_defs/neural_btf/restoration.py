@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
     compressed,
     pairs_of,
@@ -17,6 +17,7 @@ from assets_defs.neural_btf.declaration import BTF, NONE
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Metadata
 from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
 from storage.versions import Slot
 
 if TYPE_CHECKING:
@@ -52,11 +53,11 @@ def _restored_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _rmse(checked: VersionUnderCheck) -> float:
+def _rmse(checked: StoredVersion) -> float:
     return float(checked.dataset["rmse"])
 
 
-def _rmse_over_none(checked: VersionUnderCheck) -> float | None:
+def _rmse_over_none(checked: StoredVersion) -> float | None:
     """Against the same material's version without clusters, if it was made alike."""
     from storage.errors import NoVersionError
 
@@ -82,8 +83,8 @@ def _rmse_over_none(checked: VersionUnderCheck) -> float | None:
     return float(checked.dataset["rmse"]) / without if alike[0] == alike[1] else None
 
 
-def _worst(name: str) -> Callable[[VersionUnderCheck], float]:
-    def worst(checked: VersionUnderCheck) -> float:
+def _worst(name: str) -> Callable[[StoredVersion], float]:
+    def worst(checked: StoredVersion) -> float:
         return float(checked.dataset[name].max())
 
     return worst
@@ -209,11 +210,11 @@ def _cloth_pictures(dataset: xr.Dataset) -> Pictures:
     return {"frames": contact_sheet(dataset["frames"].values[shown])}
 
 
-def _coverage(checked: VersionUnderCheck) -> float:
+def _coverage(checked: StoredVersion) -> float:
     return float(checked.dataset["coverage"])
 
 
-def _mean_brightness(checked: VersionUnderCheck) -> float:
+def _mean_brightness(checked: StoredVersion) -> float:
     return float(checked.dataset["frames"].values.mean() / 255.0)
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,7 +76,7 @@ def shared_basis_of(triangle_clusters: xr.Dataset) -> SharedBasis:
     )
 
 
-def _unused(checked: VersionUnderCheck) -> float:
+def _unused(checked: StoredVersion) -> float:
     """Share of the cluster numbers up to the largest that have no triangle."""
     import numpy as np
 
@@ -85,7 +86,7 @@ def _unused(checked: VersionUnderCheck) -> float:
     return float((np.bincount(cluster) == 0).mean())
 
 
-def _compactness(checked: VersionUnderCheck) -> float:
+def _compactness(checked: StoredVersion) -> float:
     from pipelines.ssdf_lighting.compression.triangle_clusters import (
         leading_coordinates,
         spread_inside,
@@ -99,7 +100,7 @@ def _compactness(checked: VersionUnderCheck) -> float:
     return spread_inside(features, mesh["triangles"].values, dataset["cluster"].values)
 
 
-def _basis_error(checked: VersionUnderCheck) -> float:
+def _basis_error(checked: StoredVersion) -> float:
     """Error of the shared basis on sampled vertices, over the error it was made for."""
     import numpy as np
 
@@ -272,7 +273,7 @@ def decoder_of_basis(ssdf_basis: xr.Dataset, vertices: int) -> Decoder:
 
 
 def _sample(
-    checked: VersionUnderCheck,
+    checked: StoredVersion,
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
     """Vertex numbers, distances found and distances wanted of some vertices."""
     from pipelines.ssdf_lighting.compression.decoding import decoded_rows
@@ -284,7 +285,7 @@ def _sample(
     return rows, decoded_rows(decoder, rows), matrix[rows].values
 
 
-def _sampled_rmse(checked: VersionUnderCheck) -> float:
+def _sampled_rmse(checked: StoredVersion) -> float:
     """Of sampled vertices, decoded here, over that of the same vertices when it was made."""
     import numpy as np
 
@@ -297,11 +298,11 @@ def _sampled_rmse(checked: VersionUnderCheck) -> float:
     return float(rmse / max(np.sqrt((stored**2).mean()), 1e-12))
 
 
-def _rmse(checked: VersionUnderCheck) -> float:
+def _rmse(checked: StoredVersion) -> float:
     return float(checked.dataset["rmse"])
 
 
-def _over_budget(checked: VersionUnderCheck) -> float:
+def _over_budget(checked: StoredVersion) -> float:
     """What was asked for over what was reached: bytes, or error."""
     settings, dataset = checked.record["settings"], checked.dataset
     if settings["coding"] == "paper":
@@ -311,15 +312,15 @@ def _over_budget(checked: VersionUnderCheck) -> float:
     return float(dataset["rmse"] / settings["rmse"])
 
 
-def _byte_share(checked: VersionUnderCheck) -> float:
+def _byte_share(checked: StoredVersion) -> float:
     return float(checked.dataset["bytes_memory"] / checked.dataset["bytes_raw"])
 
 
-def _wrong_visibility(checked: VersionUnderCheck) -> float:
+def _wrong_visibility(checked: StoredVersion) -> float:
     return float(checked.dataset["wrong_visibility"])
 
 
-def _border_step(checked: VersionUnderCheck) -> float:
+def _border_step(checked: StoredVersion) -> float:
     """Steps of the error across borders of clusters over those inside, some directions."""
     import numpy as np
 

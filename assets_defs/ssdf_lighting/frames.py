@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.ssdf_lighting.compression import decoder_of_basis, distance_blocks
 from assets_defs.ssdf_lighting.declaration import SSDF
@@ -15,6 +15,7 @@ from assets_defs.ssdf_lighting.lights import lights_of
 from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,7 +65,7 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _psnr(checked: VersionUnderCheck, reference: str) -> float:
+def _psnr(checked: StoredVersion, reference: str) -> float:
     from pipelines.ssdf_lighting.drawing.frames import psnr
 
     dataset = checked.dataset
@@ -73,21 +74,21 @@ def _psnr(checked: VersionUnderCheck, reference: str) -> float:
     )
 
 
-def _relit_psnr(checked: VersionUnderCheck) -> float:
+def _relit_psnr(checked: StoredVersion) -> float:
     return _psnr(checked, "uncompressed")
 
 
-def _reference_psnr(checked: VersionUnderCheck) -> float:
+def _reference_psnr(checked: StoredVersion) -> float:
     return _psnr(checked, "reference")
 
 
-def _mean_brightness(checked: VersionUnderCheck) -> float:
+def _mean_brightness(checked: StoredVersion) -> float:
     dataset = checked.dataset
     shown = dataset["frames"].values[:, dataset["covered"].values > 0.999]
     return float(shown.astype("float64").mean() / 255.0)
 
 
-def _coverage(checked: VersionUnderCheck) -> float:
+def _coverage(checked: StoredVersion) -> float:
     return float(checked.dataset["covered"].values.mean())
 
 

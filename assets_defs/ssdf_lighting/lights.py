@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,20 +52,20 @@ def lights_of(environment_lights: xr.Dataset) -> Lights:
     return Lights(*(environment_lights[name].values for name in names))
 
 
-def _flux_error(checked: VersionUnderCheck) -> float:
+def _flux_error(checked: StoredVersion) -> float:
     from pipelines.ssdf_lighting.light.environment_fit import flux_error
 
     return flux_error(lights_of(checked.dataset), checked.dataset["radiance"].values)
 
 
-def _irradiance_error(checked: VersionUnderCheck) -> float:
+def _irradiance_error(checked: StoredVersion) -> float:
     from pipelines.ssdf_lighting.light.environment_fit import judged
 
     dataset = checked.dataset
     return judged(lights_of(dataset), dataset["radiance"].values).irradiance_error
 
 
-def _tone_error(checked: VersionUnderCheck) -> float:
+def _tone_error(checked: StoredVersion) -> float:
     return float(checked.dataset["tone_error"])
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,7 +114,7 @@ def scene_of(scene_mesh: xr.Dataset) -> Scene:
     )
 
 
-def _normal_error(checked: VersionUnderCheck) -> float:
+def _normal_error(checked: StoredVersion) -> float:
     """Share of the triangle corners whose normal looks to the other side of the triangle."""
     import numpy as np
 
@@ -125,7 +126,7 @@ def _normal_error(checked: VersionUnderCheck) -> float:
     return float((along < 0).mean())
 
 
-def _area(checked: VersionUnderCheck) -> float:
+def _area(checked: StoredVersion) -> float:
     import numpy as np
 
     dataset = checked.dataset

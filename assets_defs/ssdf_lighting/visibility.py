@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.system import Metadata
 from storage.schemas import ssdf_lighting as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,7 +46,7 @@ class VisibilitySettings(Settings):
     }
 
 
-def _visibility_error(checked: VersionUnderCheck) -> float:
+def _visibility_error(checked: StoredVersion) -> float:
     from pipelines.ssdf_lighting.figures import visibility_error
 
     scene = scene_of(checked.input("scene_mesh"))
@@ -60,7 +61,7 @@ def _visibility_error(checked: VersionUnderCheck) -> float:
     )
 
 
-def _visible_share(checked: VersionUnderCheck) -> float:
+def _visible_share(checked: StoredVersion) -> float:
     """Of the sphere, mean of the vertices."""
     import numpy as np
 
@@ -178,7 +179,7 @@ class MatrixSettings(Settings):
     )
 
 
-def _distance_error(checked: VersionUnderCheck) -> float:
+def _distance_error(checked: StoredVersion) -> float:
     from pipelines.ssdf_lighting.figures import distance_error, sampled_rows
 
     seen = checked.input("visibility")
@@ -190,7 +191,7 @@ def _distance_error(checked: VersionUnderCheck) -> float:
     )
 
 
-def _sign_error(checked: VersionUnderCheck) -> float:
+def _sign_error(checked: StoredVersion) -> float:
     """Share of all distances whose sign is not that of the visibility."""
     import numpy as np
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Settings
 from assets_defs.sources import Source
 from assets_defs.street_billboards.datasets import (
@@ -21,6 +21,7 @@ from assets_defs.street_billboards.datasets import (
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.system import Metadata
 from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -90,30 +91,30 @@ def _eigen_pictures(dataset: xr.Dataset) -> Pictures:
     return {"eigen-images": eigen_sheet(compressed_of(dataset))}
 
 
-def _over_budget(checked: VersionUnderCheck) -> float:
+def _over_budget(checked: StoredVersion) -> float:
     """Error over the error asked for; of the paper's form, over a grey level of 8 bit noise."""
     settings = checked.record["settings"]
     asked = settings["error"] if settings["coding"] == "compact" else 8.0
     return _decoded_rmse(checked) / float(asked)
 
 
-def _decoded_rmse(checked: VersionUnderCheck) -> float:
+def _decoded_rmse(checked: StoredVersion) -> float:
     """Of some two hundred billboards, decoded anew."""
     from pipelines.street_billboards.textures.figures import decoded_rmse
 
     return decoded_rmse(views_of(checked.input("view_textures")), compressed_of(checked.dataset))
 
 
-def _sampled_rmse(checked: VersionUnderCheck) -> float:
+def _sampled_rmse(checked: StoredVersion) -> float:
     return _decoded_rmse(checked) / max(float(checked.dataset["rmse"]), 1e-9)
 
 
-def _byte_share(checked: VersionUnderCheck) -> float:
+def _byte_share(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return float(dataset["bytes"]) / (RAW_BYTES * max(dataset.sizes["billboard"], 1))
 
 
-def _excess_rank(checked: VersionUnderCheck) -> float:
+def _excess_rank(checked: StoredVersion) -> float:
     """By how much a billboard has more eigen-images than observed views, at most."""
     import numpy as np
 
@@ -215,7 +216,7 @@ def _atlas_pictures(dataset: xr.Dataset) -> Pictures:
     return {"detail": atlas_picture(pages_of(dataset)[0])}
 
 
-def _unpacked_error(checked: VersionUnderCheck) -> float:
+def _unpacked_error(checked: StoredVersion) -> float:
     """Largest difference of sampled billboards read from the pages and decoded, in codes."""
     from pipelines.street_billboards.textures.figures import unpacked_error
 
@@ -223,7 +224,7 @@ def _unpacked_error(checked: VersionUnderCheck) -> float:
     return unpacked_error(pages_of(checked.dataset), compressed_of(stored))
 
 
-def _bytes_a_metre(checked: VersionUnderCheck) -> float:
+def _bytes_a_metre(checked: StoredVersion) -> float:
     import numpy as np
 
     from pipelines.street_billboards.billboards import HEADER_BYTES
@@ -240,7 +241,7 @@ def _metres(places: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
-def _padding_share(checked: VersionUnderCheck) -> float:
+def _padding_share(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return float(dataset["padding"]) / float(dataset["padding"] + dataset["bytes"])
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Settings
 from assets_defs.street_billboards.datasets import frame_views
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.system import Metadata
 from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,7 +53,7 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _stereo_bad(checked: VersionUnderCheck) -> float:
+def _stereo_bad(checked: StoredVersion) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
     from pipelines.street_billboards.capture.depth_refinement import filled
     from pipelines.street_billboards.capture.stereo import bad_share, match
@@ -63,7 +64,7 @@ def _stereo_bad(checked: VersionUnderCheck) -> float:
     return bad_share(filled(found.disparity, pair.left), pair.disparity)
 
 
-def _depth_error(checked: VersionUnderCheck) -> float | None:
+def _depth_error(checked: StoredVersion) -> float | None:
     """Against the true depth of held-out frames, which are matched for this alone."""
     from pipelines.street_billboards.capture.stereo import depth_maps
     from pipelines.street_billboards.capture.stereo_figures import depth_error
@@ -83,7 +84,7 @@ def _depth_error(checked: VersionUnderCheck) -> float | None:
     return depth_error(maps.depth[len(maps.depth) // 2], drive["truth_depth"][0].values)
 
 
-def _known_share(checked: VersionUnderCheck) -> float:
+def _known_share(checked: StoredVersion) -> float:
     import numpy as np
 
     return float(np.isfinite(checked.dataset["depth"]).mean().compute())
@@ -197,11 +198,11 @@ def _point_pictures(dataset: xr.Dataset) -> Pictures:
     return {"points": points_picture(dataset["positions"].values, dataset["colours"].values)}
 
 
-def _agreement(checked: VersionUnderCheck) -> float:
+def _agreement(checked: StoredVersion) -> float:
     return float(checked.dataset["agreement"].mean(skipna=True))
 
 
-def _points_a_metre(checked: VersionUnderCheck) -> float:
+def _points_a_metre(checked: StoredVersion) -> float:
     import numpy as np
 
     places = checked.input("drive_frames")["poses"].values[:, 0, :3, 3]
@@ -209,7 +210,7 @@ def _points_a_metre(checked: VersionUnderCheck) -> float:
     return checked.dataset.sizes["point"] / way
 
 
-def _stray_share(checked: VersionUnderCheck) -> float | None:
+def _stray_share(checked: StoredVersion) -> float | None:
     """Against the true depth of held-out frames: a point before it hangs in the air."""
     from pipelines.street_billboards.capture.stereo_figures import stray_share
 
@@ -225,7 +226,7 @@ def _stray_share(checked: VersionUnderCheck) -> float | None:
     )
 
 
-def _gain_step(checked: VersionUnderCheck) -> float:
+def _gain_step(checked: StoredVersion) -> float:
     """Evened out, neighbouring photographs should agree: what is left, as a factor less one."""
     import numpy as np
 

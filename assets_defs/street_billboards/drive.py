@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.system import Metadata
 from storage.readers.drives import Drive, read_drive, read_frame
 from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,13 +81,13 @@ def _drive_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _spread(checked: VersionUnderCheck) -> float:
+def _spread(checked: StoredVersion) -> float:
     """How much the photographs' mean codes differ, relative."""
     means = checked.dataset["photographs"].mean(dim=("y", "x", "channel"), dtype="float64").values
     return float(means.std() / means.mean())
 
 
-def _detail(checked: VersionUnderCheck) -> float:
+def _detail(checked: StoredVersion) -> float:
     """Mean difference of neighbouring pixels' codes: what stereo lives on."""
     import numpy as np
 
@@ -95,7 +96,7 @@ def _detail(checked: VersionUnderCheck) -> float:
     return float(np.abs(np.diff(greys, axis=-1)).mean())
 
 
-def _way(checked: VersionUnderCheck) -> float:
+def _way(checked: StoredVersion) -> float:
     """Median metres from frame to frame."""
     import numpy as np
 

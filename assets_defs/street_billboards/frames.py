@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.street_billboards.datasets import billboards_of, compressed_of, pages_of
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.street_billboards.drive import OFFSETS
 from assets_defs.system import Metadata
 from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,11 +64,11 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _mean(name: str) -> Callable[[VersionUnderCheck], float]:
+def _mean(name: str) -> Callable[[StoredVersion], float]:
     return lambda checked: float(checked.dataset[name].mean())
 
 
-def _psnr_anew(checked: VersionUnderCheck) -> float:
+def _psnr_anew(checked: StoredVersion) -> float:
     """From the stored pictures."""
     import numpy as np
 
@@ -80,11 +81,11 @@ def _psnr_anew(checked: VersionUnderCheck) -> float:
     return float(np.mean([psnr(*one) for one in pictures]))
 
 
-def _coverage(checked: VersionUnderCheck) -> float:
+def _coverage(checked: StoredVersion) -> float:
     return float(checked.dataset["covered"].mean())
 
 
-def _shader_difference(checked: VersionUnderCheck) -> float:
+def _shader_difference(checked: StoredVersion) -> float:
     """Share of the pixels in which shader and processor differ by more than a grey level."""
     import numpy as np
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from assets_defs.checks import Check, VersionUnderCheck
+from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.street_billboards.datasets import (
     billboards_of,
@@ -19,6 +19,7 @@ from assets_defs.street_billboards.datasets import (
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.system import Metadata
 from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,7 +59,7 @@ def _billboard_pictures(dataset: xr.Dataset) -> Pictures:
     return {"plan": plan_picture(billboards_of(dataset))}
 
 
-def _points_in(checked: VersionUnderCheck) -> float:
+def _points_in(checked: StoredVersion) -> float:
     """Share of the points that lie in some billboard's voxel, by a tree instead of the octree."""
     import numpy as np
     from scipy.spatial import cKDTree
@@ -70,7 +71,7 @@ def _points_in(checked: VersionUnderCheck) -> float:
     return float(np.mean(away <= half))
 
 
-def _off_plane(checked: VersionUnderCheck) -> float:
+def _off_plane(checked: StoredVersion) -> float:
     """Metres from points to the still rectangle of their voxel, median."""
     import numpy as np
     from scipy.spatial import cKDTree
@@ -88,7 +89,7 @@ def _off_plane(checked: VersionUnderCheck) -> float:
     return float(np.median(np.abs((offset * normal).sum(axis=1))))
 
 
-def _still_share(checked: VersionUnderCheck) -> float:
+def _still_share(checked: StoredVersion) -> float:
     return 1.0 - float(checked.dataset["turns"].mean())
 
 
@@ -179,12 +180,12 @@ def _view_pictures(dataset: xr.Dataset) -> Pictures:
     return {"views": views_sheet(views_of(dataset))}
 
 
-def _seen_share(checked: VersionUnderCheck) -> float:
+def _seen_share(checked: StoredVersion) -> float:
     """Of all texels of all views."""
     return float((checked.dataset["states"] == 1).mean().compute())
 
 
-def _sampling_error(checked: VersionUnderCheck) -> float:
+def _sampling_error(checked: StoredVersion) -> float:
     """Sampled anew with plain NumPy from all photographs: some must show what is stored."""
     import numpy as np
 
@@ -208,7 +209,7 @@ def _sampling_error(checked: VersionUnderCheck) -> float:
     )
 
 
-def _views_each(checked: VersionUnderCheck) -> float:
+def _views_each(checked: StoredVersion) -> float:
     dataset = checked.dataset
     return dataset.sizes["view"] / max(dataset.sizes["billboard_end"] - 1, 1)
 
