@@ -48,13 +48,26 @@ class Scene(NamedTuple):
     notes: tuple[str, ...]
 
 
-class Drawn(NamedTuple):
-    """A scene to be drawn: vertices are doubled where parts meet. ``source`` (V',) int64, the
-    scene's vertex of each; ``triangles`` (F, 3) int32; ``part`` (V',) int32."""
+class LitMesh(NamedTuple):
+    """What is drawn, each vertex of one material.
 
+    vertices: (V, 3). triangles: (F, 3), each inside one object. normals: (V, 3), unit.
+    object_of_vertex: (V,), row of ``materials``.
+    """
+
+    vertices: FloatArray
+    triangles: NDArray[np.integer]
+    normals: FloatArray
+    object_of_vertex: NDArray[np.integer]
+    materials: Materials
+
+
+class SplitScene(NamedTuple):
+    """``mesh``: a scene as it is drawn, vertices doubled where parts meet; ``source``: (V,) int64,
+    the scene's vertex of each of them."""
+
+    mesh: LitMesh
     source: NDArray[np.int64]
-    triangles: NDArray[np.int32]
-    part: NDArray[np.int32]
 
 
 def make_scene(
@@ -124,16 +137,20 @@ def built_in_scene(name: str, segments: int, floor: int) -> Scene:
     raise ValueError(f"scene is {name!r}; expected one of {', '.join(SCENES)}.")
 
 
-def split_by_part(scene: Scene) -> Drawn:
-    """Vertices as they are drawn, of one material each."""
+def split_by_part(scene: Scene) -> SplitScene:
+    """Double the vertices at which parts meet: one for each of the materials."""
     keys = scene.triangles.astype(np.int64) * len(scene.materials.albedo) + scene.part[:, None]
     found, number = np.unique(keys, return_inverse=True)
     count = len(scene.materials.albedo)
-    return Drawn(
-        found // count,
+    source = found // count
+    mesh = LitMesh(
+        scene.vertices[source],
         number.reshape(scene.triangles.shape).astype(np.int32),
+        scene.normals[source],
         (found % count).astype(np.int32),
+        scene.materials,
     )
+    return SplitScene(mesh, source)
 
 
 _Mesh = tuple[FloatArray, NDArray[np.int32]]

@@ -19,6 +19,7 @@ from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middl
 from pipelines.ssdf_lighting.drawing.ray_traced import ray_traced
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
+from pipelines.ssdf_lighting.scene import LitMesh
 from tests.reference.lit_scene import Part, light_map, mitsuba, pictures
 
 Array = NDArray[np.float64]
@@ -68,20 +69,15 @@ def clearly_shown() -> NDArray[np.bool_]:
 
 def traced(materials: Materials) -> tuple[Array, Array]:
     ball, floor = objects()
+    mesh = LitMesh(
+        np.concatenate([ball.vertices, floor.vertices]),
+        np.concatenate([ball.triangles, floor.triangles + len(ball.vertices)]),
+        np.concatenate([ball.normals, floor.normals]),
+        np.repeat([0, 1], [len(ball.vertices), len(floor.vertices)]),
+        materials,
+    )
     return mean_and_error(
-        ray_traced(
-            np.concatenate([ball.vertices, floor.vertices]),
-            np.concatenate([ball.triangles, floor.triangles + len(ball.vertices)]),
-            np.concatenate([ball.normals, floor.normals]),
-            np.repeat([0, 1], [len(ball.triangles), len(floor.triangles)]),
-            materials,
-            lights(),
-            CAMERA,
-            SIZE,
-            SAMPLES,
-            seed,
-            lambda share: None,
-        ).radiance[..., :3]
+        ray_traced(mesh, lights(), CAMERA, SIZE, SAMPLES, seed=seed).radiance[..., :3]
         for seed in range(RUNS)
     )
 

@@ -104,17 +104,7 @@ def decoded_rows(decoder: Decoder, vertices: NDArray[np.integer]) -> Floats:
 def distances_along(decoder: Decoder, vertices: NDArray[np.integer], axes: Floats) -> Floats:
     """d (P, L) float32, radians, of vertices (P,) along unit vectors (P, L, 3) float32."""
     found = np.empty(axes.shape[:2], np.float32)
-    _decode(
-        decoder.table,
-        decoder.table_start,
-        decoder.rank,
-        decoder.cluster[vertices],
-        decoder.weights,
-        decoder.weight_start[vertices],
-        decoder.resolution,
-        np.ascontiguousarray(axes, dtype=np.float32),
-        found,
-    )
+    _decode(decoder, vertices.astype(np.int64), np.ascontiguousarray(axes, dtype=np.float32), found)
     return found
 
 
@@ -160,32 +150,25 @@ def _taps(
 
 
 @njit(cache=True, nogil=True, parallel=True, fastmath={"reassoc", "contract", "nsz"})
-def _decode(
-    table: Floats,
-    table_start: NDArray[np.int64],
-    rank: NDArray[np.int64],
-    cluster: NDArray[np.int64],
-    weights: Floats,
-    weight_start: NDArray[np.int64],
-    n: int,
-    axes: Floats,
-    found: Floats,
-) -> None:
-    for vertex in prange(len(axes)):
+def _decode(decoder: Decoder, vertices: NDArray[np.int64], axes: Floats, found: Floats) -> None:
+    table, n = decoder.table, decoder.resolution
+    for row in prange(len(axes)):
         texels, shares = np.empty(4, np.int64), np.empty(4, np.float32)
-        own = cluster[vertex]
-        width = rank[own] + 1
-        weight = weights[weight_start[vertex] : weight_start[vertex] + width - 1]
+        vertex = vertices[row]
+        own = decoder.cluster[vertex]
+        width = decoder.rank[own] + 1
+        first = decoder.weight_start[vertex]
+        weight = decoder.weights[first : first + width - 1]
         for lobe in range(axes.shape[1]):
-            _taps(n, axes[vertex, lobe], texels, shares)
+            _taps(n, axes[row, lobe], texels, shares)
             distance = np.float32(0.0)
             for tap in range(4):
-                place = table_start[own] + texels[tap] * width
+                place = decoder.table_start[own] + texels[tap] * width
                 there = table[place]
                 for k in range(width - 1):
                     there += weight[k] * table[place + 1 + k]
                 distance += shares[tap] * there
-            found[vertex, lobe] = distance
+            found[row, lobe] = distance
 
 
 @njit(cache=True, nogil=True, parallel=True)

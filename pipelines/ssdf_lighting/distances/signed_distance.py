@@ -68,7 +68,7 @@ def distances_to_samples(visible: NDArray[np.bool_]) -> NDArray[np.float32]:
     n = round(visible.shape[1] ** 0.5)
     distances = np.empty(visible.shape, np.float32)
     ends = delaunay_sides(n).ends
-    _to_samples(visible, ends, *_tiles(n), texel_directions(n).astype(np.float32), distances)
+    _to_samples(visible, ends, _tiles(n), texel_directions(n).astype(np.float32), distances)
     return distances
 
 
@@ -78,18 +78,7 @@ def distances_to_arcs(visible: NDArray[np.bool_], edge: VisibleEdge) -> NDArray[
     ``visible`` (P, n²) gives the sign; NO_EDGE where a point has no edge.
     """
     distances = np.empty(visible.shape, np.float32)
-    tiles = _tiles(round(visible.shape[1] ** 0.5))
-    _to_arcs(
-        visible,
-        edge.crossings,
-        edge.arcs,
-        edge.starts,
-        tiles.order,
-        tiles.ways,
-        tiles.middles,
-        tiles.radii,
-        distances,
-    )
+    _to_arcs(visible, edge, _tiles(round(visible.shape[1] ** 0.5)), distances)
     return distances
 
 
@@ -165,13 +154,11 @@ def _beyond(
 def _to_samples(
     visible: NDArray[np.bool_],
     ends: NDArray[np.int32],
-    order: NDArray[np.int32],
-    ways: NDArray[np.float32],
-    middles: NDArray[np.float32],
-    radii: NDArray[np.float32],
+    tiles: _Tiles,
     directions: NDArray[np.float32],
     distances: NDArray[np.float32],
 ) -> None:
+    order, ways, middles, radii = tiles
     count = len(order)
     size = count // len(middles)
     marked = np.empty(count, np.bool_)
@@ -224,15 +211,12 @@ def _to_samples(
 @njit(cache=True, nogil=True, fastmath={"nsz", "contract", "reassoc", "nnan"})
 def _to_arcs(
     visible: NDArray[np.bool_],
-    crossings: NDArray[np.float32],
-    arcs: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    order: NDArray[np.int32],
-    ways: NDArray[np.float32],
-    middles: NDArray[np.float32],
-    radii: NDArray[np.float32],
+    edge: VisibleEdge,
+    tiles: _Tiles,
     distances: NDArray[np.float32],
 ) -> None:
+    crossings, arcs, starts = edge
+    order, ways, middles, radii = tiles
     most = 1
     for p in range(len(visible)):
         most = max(most, starts[p + 1] - starts[p])

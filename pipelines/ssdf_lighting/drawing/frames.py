@@ -68,22 +68,15 @@ def turning(
 
     ``look_up`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
     """
-    drawn = split_by_part(scene)
-    actor = LitActor(
-        scene.vertices[drawn.source],
-        drawn.triangles,
-        scene.normals[drawn.source],
-        drawn.part,
-        scene.materials,
-        lights,
-    )
+    split = split_by_part(scene)
+    actor = LitActor(*split.mesh, lights)
     pictures, seconds = [], []
     with Stage(*size, background=_BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)
         stage.look(camera)
         for number, turn in enumerate(turns):
             begin = time.perf_counter()
-            actor.relight(camera, rotated(lights, turn), lambda axes: look_up(drawn.source, axes))
+            actor.relight(camera, rotated(lights, turn), lambda axes: look_up(split.source, axes))
             stage.draw()
             seconds.append(time.perf_counter() - begin)
             pictures.append(stage.radiance())
@@ -105,17 +98,13 @@ def traced(
 ) -> Traced:
     """The same picture by rays towards the same lights, none of the method's shortcuts."""
     return ray_traced(
-        scene.vertices,
-        scene.triangles,
-        scene.normals,
-        scene.part,
-        scene.materials,
+        split_by_part(scene).mesh,
         lights,
         camera,
         size,
         samples,
-        seed,
-        progress,
+        seed=seed,
+        progress=progress,
         jittered=False,
     )
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles, views
-from pipelines.ssdf_lighting.light.microfacets import Materials
 from pipelines.ssdf_lighting.light.shading import lobe_tables, lobes, shaded
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, visible_table
+from pipelines.ssdf_lighting.scene import LitMesh
 
 DistancesAt = Callable[[NDArray[np.float32]], NDArray[np.floating]]
 """Axes (V, L, 3) float32 at the vertices -> d (V, L), radians. An axis of zeros asks for nothing:
@@ -22,25 +22,19 @@ _AT_ONCE = 8192  # pixels whose lobes are in memory together
 
 
 def render_numpy(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    normals: ArrayLike,
-    object_of_vertex: ArrayLike,
-    materials: Materials,
+    mesh: LitMesh,
     distances_at: DistancesAt,
     lights: Lights,
     camera: Camera,
     size: tuple[int, int],
 ) -> NDArray[np.float64]:
-    """Linear radiance and coverage (height, width, 4), row 0 at the top.
+    """Linear radiance and coverage (height, width, 4) float64, row 0 at the top.
 
-    vertices (V, 3), triangles (F, 3), normals (V, 3) unit, object_of_vertex (V,) rows of
-    ``materials``, size (width, height). One ray through each pixel's middle; normals and the
-    vertices' distances are interpolated by barycentric weights. Raises ValueError as
-    ``build_scene`` and ``lobe_tables``.
+    ``size`` is (width, height). One ray through each pixel's middle; normals and the vertices'
+    distances are interpolated by barycentric weights. Raises ValueError as ``build_scene`` and
+    ``lobe_tables``.
     """
-    points, corners = np.asarray(vertices, np.float64), np.asarray(triangles)
-    shading, material = np.asarray(normals, np.float64), np.asarray(object_of_vertex)
+    points, corners, shading, material, materials = mesh
     tables, shares = lobe_tables(materials, lights), visible_table()
     at_vertices = lobes(shading, views(camera, points), material, materials, lights, tables=tables)
     distances = np.asarray(distances_at(at_vertices.axes.astype(np.float32)), np.float64)

@@ -12,13 +12,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits, occluded
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles
 from pipelines.ssdf_lighting.light.microfacets import Materials, beckmann, check_materials, gloss
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
+from pipelines.ssdf_lighting.scene import LitMesh
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene
@@ -40,10 +41,7 @@ class Traced(NamedTuple):
 
 
 class _Surface(NamedTuple):
-    points: FloatArray
-    triangles: NDArray[np.integer]
-    normals: FloatArray
-    object_of_triangle: NDArray[np.integer]
+    mesh: LitMesh
     facing: FloatArray
     """(F, 3) geometric unit normals, on the side of the shading normals."""
     off: FloatArray
@@ -62,24 +60,18 @@ class _Spots(NamedTuple):
 
 
 def ray_traced(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    normals: ArrayLike,
-    object_of_triangle: ArrayLike,
-    materials: Materials,
+    mesh: LitMesh,
     lights: Lights,
     camera: Camera,
     size: tuple[int, int],
     samples: int,
-    seed: int,
-    progress: Callable[[float], None],
     *,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda fraction: None,
     jittered: bool = True,
 ) -> Traced:
     """Trace a picture of ``size`` = (width, height) with ``samples`` >= 2 a pixel.
 
-    vertices, normals: (V, 3), normals of length 1, interpolated; triangles: (F, 3).
-    object_of_triangle: (F,) rows of ``materials``.
     progress: is told the share of the work that is done.
     jittered: samples are spread evenly over the pixel; else all go through its middle, as the
         stage's do.
@@ -87,9 +79,9 @@ def ray_traced(
     Light from below the triangle or its shading normal does not arrive. Raises ValueError as
     ``build_scene`` and for materials that are none.
     """
-    check_materials(materials)
-    scene = build_scene(vertices, triangles)
-    surface = _surface(vertices, triangles, normals, object_of_triangle)
+    check_materials(mesh.materials)
+    scene = build_scene(mesh.vertices, mesh.triangles)
+    surface = _surface(mesh)
     middles = pixel_middles(size)
     picture, error = np.zeros((len(middles), 4)), np.zeros((len(middles), 3))
     rows = max(1, _AT_ONCE // samples)
@@ -102,7 +94,7 @@ def ray_traced(
         u = _spread(len(middles[block]), samples, rng)
         if jittered:
             places += u[:, 4:] - 0.5
-        light, hit = _sampled(scene, surface, materials, lights, camera, size, places, u[:, :4])
+        light, hit = _sampled(scene, surface, lights, camera, size, places, u[:, :4])
         light = light.reshape(-1, samples, 3)
         picture[block, :3] = light.mean(axis=1)
         picture[block, 3] = hit.reshape(-1, samples).mean(axis=1)
@@ -119,32 +111,19 @@ def _spread(pixels: int, samples: int, rng: np.random.Generator) -> FloatArray:
     return ((points + rng.random((pixels, 1, 6))) % 1.0).reshape(-1, 6)
 
 
-def _surface(
-    vertices: ArrayLike, triangles: ArrayLike, normals: ArrayLike, object_of_triangle: ArrayLike
-) -> _Surface:
-    points, corners = np.asarray(vertices, np.float64), np.asarray(triangles)
-    shading = np.asarray(normals, np.float64)
-    a, b, c = np.moveaxis(points[corners], 1, 0)
+def _surface(mesh: LitMesh) -> _Surface:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     facing = np.cross(b - a, c - a)
     doubled = np.linalg.norm(facing, axis=1, keepdims=True)
     facing = facing / np.maximum(doubled, 1e-300)
-    facing = np.where(
-        np.sum(facing * shading[corners].sum(axis=1), axis=1, keepdims=True) < 0, -facing, facing
-    )
-    return _Surface(
-        points,
-        corners,
-        shading,
-        np.asarray(object_of_triangle),
-        facing,
-        _OFF_SURFACE * np.sqrt(doubled[:, 0]),
-    )
+    outer = mesh.normals[mesh.triangles].sum(axis=1)
+    facing = np.where(np.sum(facing * outer, axis=1, keepdims=True) < 0, -facing, facing)
+    return _Surface(mesh, facing, _OFF_SURFACE * np.sqrt(doubled[:, 0]))
 
 
 def _sampled(
     scene: RaycastingScene,
     surface: _Surface,
-    materials: Materials,
     lights: Lights,
     camera: Camera,
     size: tuple[int, int],
@@ -160,18 +139,19 @@ def _sampled(
     if not hit.any():
         return light, hit
     triangle, weight = hits.triangle[hit], hits.barycentric[hit].astype(np.float64)
-    corner = surface.triangles[triangle]
+    mesh = surface.mesh
+    corner = mesh.triangles[triangle]
     facing = surface.facing[triangle]
-    at = np.einsum("sk,skc->sc", weight, surface.points[corner])
+    at = np.einsum("sk,skc->sc", weight, mesh.vertices[corner])
     spots = _Spots(
         at + facing * surface.off[triangle][:, None],
-        _unit(np.einsum("sk,skc->sc", weight, surface.normals[corner])),
+        _unit(np.einsum("sk,skc->sc", weight, mesh.normals[corner])),
         facing,
         -ways[hit],
-        surface.object_of_triangle[triangle],
+        mesh.object_of_vertex[corner[:, 0]],
     )
-    way, density, glow = _drawn(spots, materials, lights, u[hit])
-    reflected = _reflected(spots, materials, way)
+    way, density, glow = _drawn(spots, mesh.materials, lights, u[hit])
+    reflected = _reflected(spots, mesh.materials, way)
     above = (np.sum(way * spots.facing, axis=1) > 0) & (reflected > 0).any(axis=1)
     above[above] = ~occluded(scene, spots.at[above], way[above])
     light[hit] = np.where(above[:, None], glow * reflected / density[:, None], 0.0)

@@ -6,6 +6,7 @@ The same axes as ``shading.lobes`` has, in float32 and without the rest.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -32,6 +33,16 @@ class AxisTables:
         self.gloss[~has_gloss, :, 0] = -1.0
 
 
+class _Sources(NamedTuple):
+    """What all vertices share: the tables of ``AxisTables``; the lights' axes (N, 3) and their
+    sharpness (N,), single precision."""
+
+    matt: Array
+    gloss: Array
+    towards: Array
+    sharpness: Array
+
+
 def lobe_axes(
     points: Array,
     normals: Array,
@@ -47,23 +58,16 @@ def lobe_axes(
     """
     axes = np.empty((len(points), 2 * len(lights.sharpness), 3), np.float32)
     towards, sharpness = lights.axes.astype(np.float32), lights.sharpness.astype(np.float32)
-    seen_from = np.asarray(eye, np.float32)
-    _fill(points, normals, material, seen_from, tables.matt, tables.gloss, towards, sharpness, axes)
+    sources = _Sources(tables.matt, tables.gloss, towards, sharpness)
+    _fill(points, normals, material, np.asarray(eye, np.float32), sources, axes)
     return axes
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _at_vertex(
-    point: Array,
-    n: Array,
-    material: int,
-    eye: Array,
-    matt: Array,
-    gloss: Array,
-    towards: Array,
-    sharpness: Array,
-    axes: Array,
+    point: Array, n: Array, material: int, eye: Array, sources: _Sources, axes: Array
 ) -> None:
+    matt, gloss, towards, sharpness = sources
     one = np.float32(1.0)
     count, last = len(sharpness), matt.shape[1] - 1
     for k in range(count):
@@ -111,13 +115,8 @@ def _fill(
     normals: Array,
     material: NDArray[np.int32],
     eye: Array,
-    matt: Array,
-    gloss: Array,
-    towards: Array,
-    sharpness: Array,
+    sources: _Sources,
     axes: Array,
 ) -> None:
     for v in prange(len(points)):
-        _at_vertex(
-            points[v], normals[v], material[v], eye, matt, gloss, towards, sharpness, axes[v]
-        )
+        _at_vertex(points[v], normals[v], material[v], eye, sources, axes[v])

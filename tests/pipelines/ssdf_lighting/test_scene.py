@@ -189,14 +189,16 @@ def test_no_mesh_is_refused() -> None:
 
 def test_drawn_vertices_have_one_material_and_make_the_same_triangles(court: Scene) -> None:
     for scene in (court, two_colours()):
-        drawn = split_by_part(scene)
-        np.testing.assert_array_equal(drawn.source[drawn.triangles], scene.triangles)
+        mesh, source = split_by_part(scene)
+        np.testing.assert_array_equal(source[mesh.triangles], scene.triangles)
         np.testing.assert_array_equal(
-            drawn.part[drawn.triangles], np.repeat(scene.part[:, None], 3, axis=1)
+            mesh.object_of_vertex[mesh.triangles], np.repeat(scene.part[:, None], 3, axis=1)
         )
-        pairs = np.stack([drawn.source, drawn.part], axis=1)
+        np.testing.assert_array_equal(mesh.vertices, scene.vertices[source])
+        np.testing.assert_array_equal(mesh.normals, scene.normals[source])
+        pairs = np.stack([source, mesh.object_of_vertex], axis=1)
         assert len(np.unique(pairs, axis=0)) == len(pairs)
-        np.testing.assert_array_equal(np.unique(drawn.triangles), np.arange(len(drawn.source)))
+        np.testing.assert_array_equal(np.unique(mesh.triangles), np.arange(len(source)))
 
 
 def two_colours() -> Scene:
@@ -204,6 +206,5 @@ def two_colours() -> Scene:
     ball = shapes.sphere(8)
     right = (ball.vertices[ball.triangles].mean(axis=1)[:, 0] > 0).astype(int)
     scene = make_scene(ball.vertices, ball.triangles, right, TWO)
-    drawn = split_by_part(scene)
-    assert len(drawn.source) > len(scene.vertices)
+    assert len(split_by_part(scene).source) > len(scene.vertices)
     return scene

@@ -7,11 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
-from pipelines.geometry.shapes import square
+from pipelines.geometry.shapes import Mesh, square
 from pipelines.ssdf_lighting.drawing.ray_traced import Traced, ray_traced
 from pipelines.ssdf_lighting.light.microfacets import gloss
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
+from pipelines.ssdf_lighting.scene import LitMesh
 
 Array = NDArray[np.float64]
 
@@ -28,23 +29,17 @@ def leaning(degrees: float) -> Camera:
     )
 
 
+def lit(mesh: Mesh, materials: Materials) -> LitMesh:
+    """All of one material."""
+    objects = np.zeros(len(mesh.vertices), int)
+    return LitMesh(mesh.vertices, mesh.triangles, mesh.normals, objects, materials)
+
+
 def plane(
     materials: Materials, lights: Lights, camera: Camera, *, count: int = 30, samples: int = 64
 ) -> Traced:
     """``count`` x ``count`` pixels of a plane, all alike."""
-    return ray_traced(
-        FLOOR.vertices,
-        FLOOR.triangles,
-        FLOOR.normals,
-        np.zeros(len(FLOOR.triangles), int),
-        materials,
-        lights,
-        camera,
-        (count, count),
-        samples,
-        1,
-        lambda share: None,
-    )
+    return ray_traced(lit(FLOOR, materials), lights, camera, (count, count), samples, seed=1)
 
 
 def hemisphere(count: int = 500) -> tuple[Array, Array]:
@@ -113,19 +108,9 @@ def test_shadow_of_a_square_in_even_light() -> None:
     hidden = 4 / np.pi * reach / side * np.arctan(reach / side)
     even = Lights(np.array([[0.0, 0.6, 0.8]]), np.array([1e-6]), np.ones((1, 3)))
     camera = Camera((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), height=1e-4)
-    traced = ray_traced(
-        vertices,
-        triangles,
-        np.concatenate([FLOOR.normals, -roof.normals]),
-        np.zeros(len(triangles), int),
-        WHITE,
-        even,
-        camera,
-        (16, 16),
-        256,
-        3,
-        lambda share: None,
-    )
+    normals = np.concatenate([FLOOR.normals, -roof.normals])
+    mesh = LitMesh(vertices, triangles, normals, np.zeros(len(vertices), int), WHITE)
+    traced = ray_traced(mesh, even, camera, (16, 16), 256, seed=3)
     check_mean(traced, np.full(3, 1 - hidden))
 
 
@@ -133,19 +118,7 @@ def test_light_from_below_the_triangle_does_not_arrive() -> None:
     """Normals that lean over towards a light below the horizon."""
     normals = np.tile([0.8, 0.0, 0.6], (len(FLOOR.vertices), 1))
     below = Lights(np.array([[0.9797959, 0.0, -0.2]]), np.array([1000.0]), np.ones((1, 3)))
-    traced = ray_traced(
-        FLOOR.vertices,
-        FLOOR.triangles,
-        normals,
-        np.zeros(len(FLOOR.triangles), int),
-        WHITE,
-        below,
-        DOWN,
-        (4, 4),
-        64,
-        0,
-        lambda share: None,
-    )
+    traced = ray_traced(lit(FLOOR, WHITE)._replace(normals=normals), below, DOWN, (4, 4), 64)
     assert traced.radiance[..., :3].max() < 1e-6
 
 
