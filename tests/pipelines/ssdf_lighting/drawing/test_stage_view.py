@@ -16,6 +16,7 @@ from pipelines.ssdf_lighting.drawing.numpy_view import DistancesAt, render_numpy
 from pipelines.ssdf_lighting.drawing.stage_view import MOST_LIGHTS, LitActor, draw_lit
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
+from pipelines.ssdf_lighting.scene import LitMesh
 
 SIZE = (96, 72)
 MATERIALS = Materials(
@@ -82,7 +83,7 @@ def check_equal(drawn: NDArray[np.float32], expected: NDArray[np.float64]) -> No
 
 
 def numpy_picture(scene: Scene, look: Lights, camera: Camera) -> NDArray[np.float64]:
-    return render_numpy(*scene, MATERIALS, distances(scene), look, camera, SIZE)
+    return render_numpy(LitMesh(*scene, MATERIALS), distances(scene), look, camera, SIZE)
 
 
 @pytest.mark.parametrize("count", [1, 5, 16, MOST_LIGHTS])
@@ -118,7 +119,7 @@ def test_hidden_sky_is_seen(scene: Scene) -> None:
 
         actor = LitActor(*scene, MATERIALS, look)
         drawn = draw_lit(SIZE, actor, NEAR, look, moved)
-        expected = render_numpy(*scene, MATERIALS, moved, look, NEAR, SIZE)
+        expected = render_numpy(LitMesh(*scene, MATERIALS), moved, look, NEAR, SIZE)
         check_equal(drawn, expected)
         assert np.abs(expected - numpy_picture(scene, look, NEAR)).max() > 0.002
 
