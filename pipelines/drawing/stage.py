@@ -10,12 +10,9 @@ multisampling (five times the time in software): ``supersampling`` averages radi
 
 from __future__ import annotations
 
-import functools
 import math
-import os
-import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -23,16 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.glsl import Shader, surface_shader
+from pipelines.drawing.graphics_driver import require_graphics
 
 Vector = tuple[float, float, float]
 Wrap = Literal["repeat", "mirrored", "clamp"]
 
 _VTK_FLOAT = 10
 _WRAP_CODE = {"clamp": 0, "repeat": 1, "mirrored": 2}
-
-
-class NoGraphicsError(RuntimeError):
-    """There is no OpenGL driver to draw with."""
 
 
 # ---- cameras and lights ----------------------------------------------------------------------
@@ -73,6 +68,10 @@ def orbit(
 
     Azimuth 0 lies on +x and turns towards +y; elevation 90 looks straight down with +y upwards in
     the picture. Angles in degrees.
+
+    >>> camera = orbit((0.0, 0.0, 1.0), 4.0, azimuth=-90.0, elevation=0.0)
+    >>> [round(value, 9) for value in camera.position], camera.up
+    ([0.0, -4.0, 1.0], (0.0, 0.0, 1.0))
     """
     around, above = math.radians(azimuth), math.radians(elevation)
     outward = np.array(
@@ -101,6 +100,11 @@ def fitting_distance(
     """Distance from which an orbiting camera has all points (n, 3) just inside its picture.
 
     ``aspect`` is width / height; angles in degrees as in ``orbit``.
+
+    >>> import numpy as np
+    >>> square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+    >>> round(fitting_distance(square, (0, 0, 0), 0.0, 90.0, view_angle=90.0, aspect=1.0), 6)
+    1.0
     """
     camera = orbit((0.0, 0.0, 0.0), 1.0, azimuth, elevation)
     back = np.array(camera.position)
@@ -161,27 +165,7 @@ def texture(
     return made
 
 
-@dataclass(frozen=True)
-class Shader:
-    """GLSL put into VTK's shaders: code by the name of its tag, e.g. ``"Color::Impl"``.
-
-    The code stands where VTK's own for that tag stood; a ``//VTK::…`` line inside keeps VTK's.
-    """
-
-    vertex: Mapping[str, str] = field(default_factory=dict)
-    fragment: Mapping[str, str] = field(default_factory=dict)
-
-
-PAINTED = Shader(
-    vertex={
-        "TCoord::Dec": "in vec3 shown; out vec3 shownOut;",
-        "TCoord::Impl": "shownOut = shown;",
-    },
-    fragment={
-        "TCoord::Dec": "in vec3 shownOut;",
-        "Color::Impl": "//VTK::Color::Impl\n  ambientColor = shownOut; diffuseColor = vec3(0.0);",
-    },
-)
+PAINTED = surface_shader("painted_vertex.glsl", "painted_fragment.glsl")
 """Shows the attribute ``shown`` (V, 3), linear colours, of a surface that is not lit."""
 
 
@@ -403,31 +387,3 @@ def _sky(environment: NDArray[np.float32]) -> Any:
     sky.SetProjectionToSphere()
     sky.GammaCorrectOff()
     return sky
-
-
-@functools.cache
-def require_graphics() -> None:
-    """Make sure that VTK can draw without a screen. Raises NoGraphicsError."""
-    if not sys.platform.startswith("linux"):
-        return
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
-    from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
-
-    warnings, verbosity = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
-    vtkObject.SetGlobalWarningDisplay(0)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        window = vtkEGLRenderWindow()
-        window.SetOffScreenRendering(True)
-        window.Initialize()
-        works = window.SupportsOpenGL()
-        window.Finalize()
-    finally:
-        vtkObject.SetGlobalWarningDisplay(warnings)
-        vtkLogger.SetStderrVerbosity(verbosity)
-    if not works:
-        raise NoGraphicsError(
-            "OpenGL cannot be started: EGL found no driver; expected a graphics card's driver or "
-            "Mesa (Debian, Ubuntu: sudo apt-get install libegl1 libgl1-mesa-dri)."
-        )

@@ -18,17 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
-from pipelines.drawing.stage import Shader, Wrap, surface, texture
+from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.stage import Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
 
 Fill = Literal["columns", "bands"]
-
-_VERTEX = Shader(
-    vertex={
-        "TCoord::Dec": "in vec2 uv; in float layer; out vec2 uvOut; flat out float layerOut;",
-        "TCoord::Impl": "uvOut = uv; layerOut = layer;",
-    }
-)
 
 
 def fur_texture(
@@ -75,29 +69,12 @@ def fur_surface(
                 image, wrap=wrap, interpolate=interpolate, mipmap=False, srgb=True
             )
         },
-        shader=Shader(_VERTEX.vertex, _fragment(layers, attenuation, fill)),
+        shader=surface_shader(
+            "fur_vertex.glsl",
+            "fur_fragment.glsl",
+            CODE_STEPS=float(code_steps(layers)),
+            COLUMNS=fill == "columns",
+            DECAY=attenuation.coefficient / layers,
+        ),
         lit=lit,
     )
-
-
-def _fragment(layers: int, attenuation: Attenuation, fill: Fill) -> dict[str, str]:
-    steps = code_steps(layers)
-    above = {
-        "bands": "discard;",
-        "columns": f"""{{
-    float own = floor(code / {steps}.0) + 1.0;
-    texel.rgb *= exp({attenuation.coefficient / layers!r} * (own - layerOut));
-  }}""",
-    }[fill]
-    return {
-        "TCoord::Dec": "in vec2 uvOut; flat in float layerOut;",
-        "Color::Impl": f"""//VTK::Color::Impl
-  vec4 texel = texture(photograph, uvOut);
-  float code = floor(texel.a * 255.0 + 0.5);
-  float deepest = layerOut * {steps}.0;
-  if (code >= deepest) discard;
-  if (code < deepest - {steps}.0) {above}
-  ambientColor = vec3(0.0);
-  diffuseColor = texel.rgb;
-""",
-    }

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.drawing import stage as module
+from pipelines.drawing import graphics_driver
+from pipelines.drawing.glsl import Shader
+from pipelines.drawing.graphics_driver import NoGraphicsError
 from pipelines.drawing.stage import (
     Camera,
     Light,
-    NoGraphicsError,
-    Shader,
     Stage,
     Vector,
     Wrap,
@@ -746,7 +746,8 @@ def test_stages_in_several_threads_draw_what_one_draws() -> None:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's")
 def test_without_a_driver_one_sentence_says_what_to_install() -> None:
     code = (
-        "from pipelines.drawing.stage import NoGraphicsError, Stage\n"
+        "from pipelines.drawing.graphics_driver import NoGraphicsError\n"
+        "from pipelines.drawing.stage import Stage\n"
         "try: Stage(8, 8)\n"
         "except NoGraphicsError as error: print(error)\n"
     )
@@ -782,12 +783,12 @@ def test_a_failed_look_for_a_driver_is_repeated(monkeypatch: pytest.MonkeyPatch)
 
         def Finalize(self) -> None: ...  # noqa: N802
 
-    module.require_graphics.cache_clear()
+    graphics_driver.require_graphics.cache_clear()
     with monkeypatch.context() as patch:
         patch.setattr(vtkRenderingOpenGL2, "vtkEGLRenderWindow", Driverless)
         with pytest.raises(NoGraphicsError):
-            module.require_graphics()
-    module.require_graphics()
+            graphics_driver.require_graphics()
+    graphics_driver.require_graphics()
 
 
 def test_the_renderer_has_a_name() -> None:
