@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +20,20 @@ from rich.console import Console
 
 from assets_defs.workspace import CHECKOUT
 from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance
-from pipelines.drawing.stage import Light, Shader, Stage, orbit, surface, texture
+from pipelines.drawing.glsl import Shader
+from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
-from pipelines.photo_fur.attenuation import (
-    Attenuation,
-    depth_rank_correlation,
-    fit_attenuation,
-    layer_masks,
-    layer_of,
-)
+from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
     SQUARE_VIEWS,
     draw_frames,
-    square_of_photograph,
-    top_view_error,
+    stretched_to_photograph,
 )
-from pipelines.photo_fur.shells import shell_vertices
+from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
+from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh
 from pipelines.virtual.pelt.pelt import virtual_pelt
 from storage.readers.photographs import builtin_photograph
 
@@ -47,14 +43,6 @@ WINDOW = (640, 480)
 FRAMES = 41
 PELT = {"size": 512, "hairs": 16_000, "samples": 24}
 SEEDS = (0, 1, 2)
-
-
-class Photograph(NamedTuple):
-    """A photograph with its medium."""
-
-    radiance: NDArray[np.float32]
-    luminance: NDArray[np.floating]
-    attenuation: Attenuation
 
 
 def run() -> dict[str, Any]:
@@ -80,10 +68,8 @@ def run() -> dict[str, Any]:
 # ---- exactness -------------------------------------------------------------------------------
 
 
-def _photograph(name: str) -> Photograph:
-    radiance = builtin_photograph(name)
-    grey = luminance(radiance)
-    return Photograph(radiance, grey, fit_attenuation(grey, tail=TAIL))
+def _photograph(name: str) -> FurPhotograph:
+    return fur_photograph(builtin_photograph(name), tail=TAIL)
 
 
 def _top_view() -> dict[str, Any]:
@@ -91,23 +77,18 @@ def _top_view() -> dict[str, Any]:
     errors = {}
     for name in ("grass", "chelsea"):
         photo = _photograph(name)
-        mesh = shapes.square(32)
-        shells = shell_vertices(mesh.vertices, mesh.normals, 0.05, 8)
-        shape = photo.luminance.shape
+        mesh = make_shell_mesh(shapes.square(32), 8, thickness=0.05)
+        height, width = photo.luminance.shape
         drawn = draw_frames(
-            *photo,
-            square_of_photograph(shells, (shape[0], shape[1])),
-            mesh.normals,
-            mesh.triangles,
-            mesh.uvs,
+            photo,
+            stretched_to_photograph(mesh, photo),
             SQUARE_VIEWS[:1],
-            size=(shape[0], shape[1]),
+            size=(height, width),
             supersampling=1,
             tails="end layers",
             fill="columns",
-            progress=lambda fraction: None,
         )
-        errors[name] = top_view_error(drawn.pictures[0], photo.radiance)
+        errors[name] = top_view_rmse(drawn.pictures[0], photo.radiance)
     return {"top_view_rmse": max(errors.values()), "top_view_rmse_each": errors}
 
 
@@ -127,8 +108,7 @@ def _derive() -> dict[str, Any]:
     grey = luminance(builtin_photograph("grass"))
 
     def derive() -> None:
-        attenuation = fit_attenuation(grey, tail=TAIL)
-        layer_masks(layer_of(grey, attenuation, LAYERS, tails="end layers"), LAYERS)
+        make_shell_stack(grey, fit_attenuation(grey, tail=TAIL), LAYERS, tails="end layers")
 
     return {"derive_ms": 1000 * statistics.median(_time(derive) for _ in range(11))}
 
@@ -136,15 +116,14 @@ def _derive() -> dict[str, Any]:
 # ---- drawing ---------------------------------------------------------------------------------
 
 
-def _large() -> tuple[shapes.Mesh, NDArray[np.float32]]:
-    mesh = shapes.teapot(33)
-    return mesh, shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
+def _teapot(segments: int) -> ShellMesh:
+    return make_shell_mesh(shapes.teapot(segments), LAYERS, thickness=0.06)
 
 
-def _ours(photo: Photograph, mesh: shapes.Mesh, shells: NDArray[np.float32], fill: Fill) -> Any:
+def _ours(photo: FurPhotograph, mesh: ShellMesh, fill: Fill) -> Any:
     image = fur_texture(*photo, LAYERS, tails="end layers")
     return fur_surface(
-        shells,
+        mesh.vertices,
         mesh.normals,
         mesh.triangles,
         mesh.uvs,
@@ -157,7 +136,7 @@ def _ours(photo: Photograph, mesh: shapes.Mesh, shells: NDArray[np.float32], fil
     )
 
 
-def _layer_images(photo: Photograph, fill: Fill) -> list[NDArray[np.uint8]]:
+def _layer_images(photo: FurPhotograph, fill: Fill) -> list[NDArray[np.uint8]]:
     """What the usual shells keep: an RGBA8 texture a layer that says where there is hair."""
     layer = layer_of(photo.luminance, photo.attenuation, LAYERS, tails="end layers")
     colours = decode_srgb(np.rint(encode_srgb(photo.radiance) * 255) / 255)
@@ -170,9 +149,7 @@ def _layer_images(photo: Photograph, fill: Fill) -> list[NDArray[np.uint8]]:
     return images
 
 
-def _usual(
-    photo: Photograph, mesh: shapes.Mesh, shells: NDArray[np.float32], fill: Fill
-) -> tuple[list[Any], list[Any]]:
+def _usual(photo: FurPhotograph, mesh: ShellMesh, fill: Fill) -> tuple[list[Any], list[Any]]:
     """A texture and a draw a layer, tips first as ours; everything else as ours."""
     shader = Shader(
         vertex={
@@ -202,7 +179,7 @@ def _usual(
             textures={"photograph": image},
             shader=shader,
         )
-        for vertices, image in zip(shells, textures, strict=True)
+        for vertices, image in zip(mesh.vertices, textures, strict=True)
     ]
     return actors, textures
 
@@ -210,11 +187,11 @@ def _usual(
 def _frames() -> dict[str, Any]:
     """Both sides on one stage, frames in turns; the medians' ratio. Their pictures must agree."""
     photo = _photograph("grass")
-    mesh, shells = _large()
+    mesh = _teapot(33)
     ours_bytes = fur_texture(*photo, LAYERS, tails="end layers").nbytes
     usual_bytes = sum(image.nbytes for image in _layer_images(photo, "columns"))
     figures: dict[str, Any] = {
-        "vertices": len(mesh.vertices),
+        "vertices": len(mesh.normals),
         "layers": LAYERS,
         "texture_bytes": ours_bytes,
         "texture_bytes_usual": usual_bytes,
@@ -223,8 +200,8 @@ def _frames() -> dict[str, Any]:
     fills: tuple[tuple[Fill, str], ...] = (("columns", ""), ("bands", "_bands"))
     for fill, suffix in fills:
         with Stage(*WINDOW, background=BACKGROUND) as stage:
-            ours = [_ours(photo, mesh, shells, fill)]
-            usual, textures = _usual(photo, mesh, shells, fill)
+            ours = [_ours(photo, mesh, fill)]
+            usual, textures = _usual(photo, mesh, fill)
             stage.light(Light())
             stage.add(*ours, *usual)
             stage.look(_view(mesh))
@@ -265,23 +242,22 @@ def _speeds() -> dict[str, Any]:
     photo = _photograph("grass")
     figures: dict[str, Any] = {}
     for name, segments in (("fps_teapot", 8), ("fps_large", 33)):
-        mesh = shapes.teapot(segments)
-        shells = shell_vertices(mesh.vertices, mesh.normals, 0.06, LAYERS)
+        mesh = _teapot(segments)
         with Stage(*WINDOW, background=BACKGROUND) as stage:
             stage.light(Light())
-            stage.add(_ours(photo, mesh, shells, "columns"))
+            stage.add(_ours(photo, mesh, "columns"))
             stage.look(_view(mesh))
             stage.draw()
             figures[name] = 1 / statistics.median(_time(stage.draw) for _ in range(FRAMES))
-            figures[f"vertices_{name.removeprefix('fps_')}"] = len(mesh.vertices)
+            figures[f"vertices_{name.removeprefix('fps_')}"] = len(mesh.normals)
             figures["renderer"] = stage.renderer_name
     return figures | {"window": list(WINDOW)}
 
 
-def _view(mesh: shapes.Mesh) -> Any:
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    x, y, z = (low + high) / 2
-    radius = float(np.linalg.norm(mesh.vertices - (x, y, z), axis=1).max()) + 0.06
+def _view(mesh: ShellMesh) -> Any:
+    skin = mesh.vertices[-1].astype(np.float64)
+    x, y, z = (skin.min(axis=0) + skin.max(axis=0)) / 2
+    radius = float(np.linalg.norm(skin - (x, y, z), axis=1).max()) + mesh.thickness
     return orbit((x, y, z), radius / np.sin(np.radians(15)), -60.0, 22.0)
 
 

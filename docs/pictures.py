@@ -12,7 +12,7 @@ from PIL import Image
 
 from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.neural_btf.graph import BTF
-from assets_defs.photo_fur import FUR
+from assets_defs.photo_fur.graph import FUR
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.datasets import billboards_of, pages_of, views_of
 from assets_defs.street_billboards.graph import STREET

@@ -60,7 +60,17 @@ class Histogram(NamedTuple):
 
 
 def luminance_histogram(luminance: NDArray[np.floating]) -> Histogram:
-    """256 bins, one about each sRGB code value, so an 8-bit grey photograph fills them exactly."""
+    """256 bins, one about each sRGB code value, so an 8-bit grey photograph fills them exactly.
+
+    luminance: any shape, linear, 0 and more; what is brighter than white is in the last bin.
+
+    >>> import numpy as np
+    >>> histogram = luminance_histogram(np.array([[0.0, 0.0, 0.5, 1.0]]))
+    >>> histogram.counts.shape, histogram.edges.shape
+    ((256,), (257,))
+    >>> histogram.counts.nonzero()[0].tolist()
+    [0, 188, 255]
+    """
     codes = (np.arange(257) - 0.5) / 255.0
     edges = np.concatenate([[0.0], decode_srgb(codes[1:-1]), [np.inf]])
     places = np.searchsorted(edges, luminance.ravel(), side="right") - 1
@@ -73,6 +83,11 @@ def fit_attenuation(luminance: NDArray[np.floating], *, tail: float) -> Attenuat
     The thin tails of the histogram are noise (section 3.2): whole bins are cut while the pixels
     cut stay within the share. Pure black is no light at all and always counts as tail, since
     Imin must not be 0. Raises ValueError where no two luminances are left.
+
+    >>> import numpy as np
+    >>> brightest, darkest = fit_attenuation(np.linspace(0.1, 0.8, 50).reshape(5, 10), tail=0.0)
+    >>> round(brightest, 3), round(darkest, 3)
+    (0.8, 0.1)
     """
     if not 0.0 <= tail < 0.5:
         raise ValueError(f"tail is {tail}; expected a share in [0, 0.5).")
@@ -98,7 +113,12 @@ def layer_of(
     """The layer of every pixel: n where I(n) < I <= I(n-1), 1 at the tips (section 3.2).
 
     Imin itself belongs to the last layer. Pixels outside [Imin, Imax] go to the end layers or
-    are dropped (0). Raises ValueError.
+    are dropped (0). Raises ValueError for a number of layers that cannot be drawn.
+
+    >>> import numpy as np
+    >>> luminance = np.array([[0.9, 0.8, 0.3, 0.1]])
+    >>> layer_of(luminance, Attenuation(0.8, 0.2), 2, tails="dropped").tolist()
+    [[0, 1, 2, 0]]
     """
     descending = attenuation.boundaries(layers)
     inner = descending[1:-1][::-1]
@@ -114,6 +134,69 @@ def layer_masks(layer: NDArray[np.uint8], layers: int) -> NDArray[np.bool_]:
     return layer[None] == np.arange(1, layers + 1, dtype=np.uint8)[:, None, None]
 
 
+class ShellStack(NamedTuple):
+    """The photograph cut into layers."""
+
+    layer: NDArray[np.uint8]
+    """(y, x): layer of the pixel, 1 at the tips; 0 = dropped."""
+    masks: NDArray[np.bool_]
+    """(layers, y, x): whether the pixel is in the layer."""
+
+
+def make_shell_stack(
+    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+) -> ShellStack:
+    """The layer of every pixel of a photograph (y, x), and the layers' masks (section 3.2).
+
+    Raises ValueError for a number of layers that cannot be drawn.
+
+    >>> import numpy as np
+    >>> luminance = np.array([[0.9, 0.6], [0.3, 0.2]])
+    >>> stack = make_shell_stack(luminance, Attenuation(0.9, 0.2), 3, tails="dropped")
+    >>> stack.layer.tolist(), stack.masks.shape
+    ([[1, 1], [3, 3]], (3, 2, 2))
+    """
+    layer = layer_of(luminance, attenuation, layers, tails=tails)
+    return ShellStack(layer, layer_masks(layer, layers))
+
+
+class LayerHistogram(NamedTuple):
+    """A photograph's histogram, the medium read from it, and how its pixels fall into layers."""
+
+    attenuation: Attenuation
+    histogram: Histogram
+    boundaries: NDArray[np.float64]
+    """(layers + 1,): luminances between the layers, descending (Eq. 4)."""
+    pixels_per_layer: NDArray[np.int64]
+    """(layers,): pixels in [Imin, Imax], tips first."""
+    bright_tail: int
+    """Pixels brighter than Imax."""
+    dark_tail: int
+    """Pixels darker than Imin."""
+
+
+def layer_histogram(luminance: NDArray[np.floating], *, tail: float, layers: int) -> LayerHistogram:
+    """Fit the medium to a photograph (``fit_attenuation``) and count the pixels of every layer.
+
+    Raises ValueError as ``fit_attenuation`` does and for a number of layers that cannot be drawn.
+
+    >>> import numpy as np
+    >>> found = layer_histogram(np.linspace(0.1, 0.8, 50), tail=0.02, layers=3)
+    >>> found.pixels_per_layer.tolist(), found.bright_tail, found.dark_tail
+    ([27, 13, 8], 1, 1)
+    """
+    attenuation = fit_attenuation(luminance, tail=tail)
+    layer = layer_of(luminance, attenuation, layers, tails="dropped")
+    return LayerHistogram(
+        attenuation,
+        luminance_histogram(luminance),
+        attenuation.boundaries(layers),
+        np.bincount(layer.ravel(), minlength=layers + 1)[1:],
+        bright_tail=int(np.count_nonzero(luminance > attenuation.brightest)),
+        dark_tail=int(np.count_nonzero(luminance < attenuation.darkest)),
+    )
+
+
 def code_steps(layers: int) -> int:
     """Steps of the 8-bit depth code in each layer. Raises ValueError."""
     require_layers(layers)
@@ -127,7 +210,12 @@ def depth_code(
 
     The steps divide the layers evenly, so comparing codes is exactly the comparison of the full
     luminance with I(n-1) and I(n), and the code still grows evenly with the depth, so filtering it
-    makes sense.
+    makes sense. Raises ValueError for a number of layers that cannot be drawn.
+
+    >>> import numpy as np
+    >>> luminance = np.array([[0.8, 0.4, 0.2, 0.1]])
+    >>> depth_code(luminance, Attenuation(0.8, 0.2), 2, tails="dropped").tolist()
+    [[0, 127, 253, 255]]
     """
     steps = code_steps(layers)
     layer = layer_of(luminance, attenuation, layers, tails=tails)
@@ -137,13 +225,6 @@ def depth_code(
     step = np.minimum((within * steps).astype(np.int64), steps - 1)
     code = (layer.astype(np.int64) - 1) * steps + step
     return np.where(layer == 0, DROPPED, code).astype(np.uint8)
-
-
-def depth_rank_correlation(luminance: NDArray[np.floating], depth: NDArray[np.floating]) -> float:
-    """Spearman rank correlation of darkness with true depth: 1 = brightness orders depth."""
-    from scipy.stats import spearmanr
-
-    return float(spearmanr(-luminance.ravel(), depth.ravel()).statistic)
 
 
 def require_layers(layers: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.colour import to_8bit
 from pipelines.photo_fur.attenuation import Tails
 
 
@@ -19,10 +20,22 @@ def clipped_share(radiance: NDArray[np.floating]) -> float:
     return float((radiance >= 1.0).all(axis=-1).mean())
 
 
+def kept_share(pixels_per_layer: NDArray[np.integer], histogram: NDArray[np.integer]) -> float:
+    """Share of the pixels between Imin and Imax: those of all layers among all in the histogram."""
+    return float(pixels_per_layer.sum() / histogram.sum())
+
+
 def decay_error(boundaries: NDArray[np.float64], brightest: float, coefficient: float) -> float:
     """Largest relative step of I(n) (Eq. 4) from Eq. 1 at the depths of Eq. 3."""
     depth = np.linspace(0.0, 1.0, len(boundaries))
     return float(np.abs(boundaries / (brightest * np.exp(-coefficient * depth)) - 1.0).max())
+
+
+def depth_rank_correlation(luminance: NDArray[np.floating], depth: NDArray[np.floating]) -> float:
+    """Spearman rank correlation of darkness with true depth: 1 = brightness orders depth."""
+    from scipy.stats import spearmanr
+
+    return float(spearmanr(-luminance.ravel(), depth.ravel()).statistic)
 
 
 def partition_error(layer: NDArray[np.uint8], masks: NDArray[np.bool_]) -> float:
@@ -58,3 +71,19 @@ def step_error(
     heights = thickness * (1.0 - np.arange(1, layers + 1) / layers)
     expected = shells[-1].astype(np.float64) + heights[:, None, None] * normals
     return float(np.linalg.norm(shells - expected, axis=-1).max() / thickness)
+
+
+def top_view_rmse(picture: NDArray[np.uint8], radiance: NDArray[np.floating]) -> float:
+    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB.
+
+    The picture has one pixel a texel, or a square of pixels each.
+    """
+    times = len(picture) // len(radiance)
+    expected = to_8bit(radiance).repeat(times, axis=0).repeat(times, axis=1)
+    step = picture.astype(np.float64) - expected
+    return float(np.sqrt(np.mean((step / 255.0) ** 2)))
+
+
+def mean_brightness(pictures: NDArray[np.uint8]) -> float:
+    """Mean of the pictures' 8-bit codes, in [0, 1]."""
+    return float(pictures.mean(dtype=np.float64) / 255.0)

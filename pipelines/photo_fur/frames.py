@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, fitting_distance, orbit
-from pipelines.photo_fur.attenuation import Attenuation, Tails
+from pipelines.photo_fur.attenuation import Tails
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.photograph import FurPhotograph
+from pipelines.photo_fur.shells import ShellMesh
 
 BACKGROUND = (0.32, 0.34, 0.37)
 LEAST_SIDE = 384
@@ -25,11 +27,11 @@ class View(NamedTuple):
 
     azimuth: float
     elevation: float
-    photograph: bool = False
+    as_photographed: bool = False
     """Straight above, orthographic, unlit, nearest texel: shows the photograph itself."""
 
 
-SQUARE_VIEWS = (View(-90.0, 90.0, photograph=True), View(-60.0, 28.0))
+SQUARE_VIEWS = (View(-90.0, 90.0, as_photographed=True), View(-60.0, 28.0))
 """Above and from the side (figure 3)."""
 
 ROUND_VIEWS = tuple(View(azimuth, 22.0) for azimuth in (-90.0, 0.0, 90.0, 180.0))
@@ -46,45 +48,43 @@ class Frames(NamedTuple):
 
 
 def draw_frames(
-    radiance: NDArray[np.floating],
-    luminance: NDArray[np.floating],
-    attenuation: Attenuation,
-    shells: NDArray[np.float32],
-    normals: NDArray[np.floating],
-    triangles: NDArray[np.integer],
-    uvs: NDArray[np.floating],
+    photograph: FurPhotograph,
+    mesh: ShellMesh,
     views: Sequence[View],
     *,
     size: tuple[int, int],
-    supersampling: int,
-    tails: Tails,
-    fill: Fill,
-    progress: Callable[[float], None],
+    supersampling: int = 2,
+    tails: Tails = "end layers",
+    fill: Fill = "columns",
+    progress: Callable[[float], None] | None = None,
 ) -> Frames:
     """Draw the fur from every view, in pictures of size = (height, width) pixels.
 
-    The light comes along the view, as it did in the photograph (Lambert).
+    The light comes along the view, as it did in the photograph (Lambert). ``supersampling``:
+    samples along each side of a pixel; ``progress`` is called with the fraction done. Raises
+    ``drawing.stage.NoGraphicsError`` where nothing can be drawn.
     """
-    image = fur_texture(radiance, luminance, attenuation, len(shells), tails=tails)
+    image = fur_texture(*photograph, mesh.layers, tails=tails)
     height, width = size
-    cameras = _cameras(views, shells.reshape(-1, 3), width / height)
+    cameras = _cameras(views, mesh.vertices.reshape(-1, 3), width / height)
     pictures, coverage = [], []
     for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
-        progress(done / len(views))
-        scale = 1 if view.photograph else supersampling
+        if progress is not None:
+            progress(done / len(views))
+        scale = 1 if view.as_photographed else supersampling
         with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
             stage.add(
                 fur_surface(
-                    shells,
-                    normals,
-                    triangles,
-                    uvs,
+                    mesh.vertices,
+                    mesh.normals,
+                    mesh.triangles,
+                    mesh.uvs,
                     image,
-                    attenuation,
+                    photograph.attenuation,
                     fill=fill,
                     wrap="mirrored",
-                    interpolate=not view.photograph,
-                    lit=not view.photograph,
+                    interpolate=not view.as_photographed,
+                    lit=not view.as_photographed,
                 )
             )
             stage.light(Light())
@@ -95,28 +95,22 @@ def draw_frames(
     return Frames(np.stack(pictures), np.array(coverage))
 
 
-def top_view_error(picture: NDArray[np.uint8], radiance: NDArray[np.floating]) -> float:
-    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB.
+def top_view_size(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Size of the square's pictures: the photograph's, or several times it where that is small.
 
-    The picture has one pixel a texel, or a square of pixels each.
+    >>> top_view_size((512, 700)), top_view_size((128, 200))
+    ((512, 700), (384, 600))
     """
-    times = len(picture) // len(radiance)
-    expected = to_8bit(radiance).repeat(times, axis=0).repeat(times, axis=1)
-    step = picture.astype(np.float64) - expected
-    return float(np.sqrt(np.mean((step / 255.0) ** 2)))
-
-
-def size_from_above(shape: tuple[int, int]) -> tuple[int, int]:
-    """Size of the square's pictures: the photograph's, or several times it where that is small."""
     height, width = shape
     times = max(1, LEAST_SIDE // min(shape))
     return height * times, width * times
 
 
-def square_of_photograph(vertices: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.float32]:
-    """The unit square's vertices stretched in x to the photograph's proportions (y, x)."""
-    height, width = shape
-    return (vertices * np.array([width / height, 1.0, 1.0])).astype(np.float32)
+def stretched_to_photograph(mesh: ShellMesh, photograph: FurPhotograph) -> ShellMesh:
+    """The unit square stretched in x to the photograph's proportions."""
+    height, width = photograph.luminance.shape
+    vertices = mesh.vertices * np.array([width / height, 1.0, 1.0])
+    return mesh._replace(vertices=vertices.astype(np.float32))
 
 
 def _cameras(views: Sequence[View], points: NDArray[np.float32], aspect: float) -> list[Camera]:
@@ -129,7 +123,7 @@ def _cameras(views: Sequence[View], points: NDArray[np.float32], aspect: float) 
     )
     return [
         orbit((x, y, z), distance, *view[:2], height=float(high[1] - low[1]))
-        if view.photograph
+        if view.as_photographed
         else orbit((x, y, z), distance, *view[:2], **lens)
         for view in views
     ]

@@ -1,12 +1,43 @@
-"""A photograph made ready for the model: exposure and size."""
+"""A photograph made ready for the model: exposure, size, and its medium."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.colour import luminance
+from pipelines.photo_fur.attenuation import Attenuation, fit_attenuation
+
 HIGHLIGHT_SHARE = 0.001
 """Share of the channels' values that may clip when an HDR photograph is exposed."""
+
+
+class FurPhotograph(NamedTuple):
+    """A photograph of fur and the medium that its histogram tells."""
+
+    radiance: NDArray[np.floating]
+    """(y, x, 3), linear RGB, white = 1."""
+    luminance: NDArray[np.floating]
+    """(y, x), linear."""
+    attenuation: Attenuation
+
+
+def fur_photograph(radiance: NDArray[np.floating], *, tail: float = 0.005) -> FurPhotograph:
+    """Luminance and medium of a photograph (y, x, 3) that is exposed already (``expose``).
+
+    ``tail``: share of the pixels cut off at each end of the histogram. Raises ValueError where the
+    photograph has a single luminance.
+
+    >>> import numpy as np
+    >>> radiance = np.linspace(0.1, 0.9, 192).reshape(8, 8, 3)
+    >>> photograph = fur_photograph(radiance)
+    >>> photograph.luminance.shape, round(photograph.attenuation.coefficient, 2)
+    ((8, 8), 2.16)
+    """
+    grey = luminance(radiance)
+    return FurPhotograph(radiance, grey, fit_attenuation(grey, tail=tail))
 
 
 def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -14,6 +45,12 @@ def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
 
     White is the radiance that only HIGHLIGHT_SHARE of the values exceed, but never below 1: an
     HDR photograph is darkened where it must be, not brightened.
+
+    >>> import numpy as np
+    >>> expose(np.array([[[0.25, 0.5, 0.75]]])).tolist()  # inside [0, 1]: as it is
+    [[[0.25, 0.5, 0.75]]]
+    >>> expose(np.full((2, 2, 3), 4.0)).ravel().tolist() == [1.0] * 12
+    True
     """
     white = max(1.0, float(np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE)))
     return np.clip(radiance / white, 0.0, 1.0).astype(np.float32)

@@ -12,7 +12,7 @@ from PIL import Image
 
 from assets_defs.inbox import take_in
 from assets_defs.launcher import LaunchError, Request
-from assets_defs.photo_fur import FUR
+from assets_defs.photo_fur.graph import FUR
 from pipelines.photo_fur import attenuation
 
 

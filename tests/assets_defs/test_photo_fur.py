@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import LaunchError, Request
-from assets_defs.photo_fur import FUR
+from assets_defs.photo_fur.datasets import LOADERS
+from assets_defs.photo_fur.graph import FUR
 from pipelines.geometry import shapes
 from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells
+from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
+from storage.stored_version import StoredVersion
 from storage.versions import Slot
 from tests.assets_defs.regressions import Regression, assert_found
 
@@ -47,6 +50,32 @@ def test_frames_show_the_photograph_from_above(good: Any) -> None:
     encoded = np.where(photo <= 0.0031308, 12.92 * photo, 1.055 * photo ** (1 / 2.4) - 0.055)
     encoded = encoded.repeat(3, axis=0).repeat(3, axis=1)  # 128 pixels are shown as 384
     assert np.abs(picture / 255 - encoded).max() <= 0.5 / 255 + 1e-6
+
+
+def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
+    """The objects that LOADERS make of stored versions, through the numerics to the pictures."""
+    store = good.workspace.store
+
+    def load(asset: str, partition: str) -> Any:
+        slot = Slot("photo_fur", asset, partition)
+        return LOADERS[asset](StoredVersion(store, slot, store.current(slot)))
+
+    photograph, mesh = load("attenuation", "pelt"), load("shell_mesh", "teapot")
+    assert isinstance(photograph, FurPhotograph)
+    assert isinstance(mesh, shells.ShellMesh)
+    drawn = frames.draw_frames(photograph, mesh, frames.ROUND_VIEWS, size=(72, 96), supersampling=1)
+    stored = store.open(Slot("photo_fur", "fur_frames", "teapot.pelt"))
+    np.testing.assert_array_equal(drawn.pictures, stored["frames"].values)
+    np.testing.assert_array_equal(drawn.coverage, stored["coverage"].values)
+    heights = store.open(Slot("photo_fur", "shell_mesh", "teapot"))["height"].values
+    np.testing.assert_array_equal(mesh.heights, heights)
+    stack = load("shell_stack", "pelt")
+    assert isinstance(stack, attenuation.ShellStack)
+    found = attenuation.make_shell_stack(
+        photograph.luminance, photograph.attenuation, 15, tails="end layers"
+    )
+    np.testing.assert_array_equal(stack.layer, found.layer)
+    np.testing.assert_array_equal(stack.masks, found.masks)
 
 
 def test_a_second_launch_makes_nothing_and_a_forced_one_everything(good: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from assets_defs.launcher import Request
-from assets_defs.photo_fur import FUR
+from assets_defs.photo_fur.graph import FUR
 
 
 @pytest.mark.slow

@@ -19,11 +19,12 @@ from pipelines.photo_fur.attenuation import (
     Tails,
     code_steps,
     depth_code,
-    depth_rank_correlation,
     fit_attenuation,
+    layer_histogram,
     layer_masks,
     layer_of,
     luminance_histogram,
+    make_shell_stack,
 )
 
 TAILS: tuple[Tails, ...] = ("end layers", "dropped")
@@ -228,6 +229,43 @@ def test_the_masks_are_a_partition(cut: Cut, tails: Tails) -> None:
 
 
 @settings(deadline=None)
+@given(cuts(), st.sampled_from(TAILS))
+def test_a_stack_holds_the_layers_and_their_masks(cut: Cut, tails: Tails) -> None:
+    stack = make_shell_stack(cut.luminance, cut.medium, cut.layers, tails=tails)
+    layer = layer_of(cut.luminance, cut.medium, cut.layers, tails=tails)
+    np.testing.assert_array_equal(stack.layer, layer)
+    np.testing.assert_array_equal(stack.masks, layer_masks(layer, cut.layers))
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.integers(0, 255), min_size=4, max_size=120),
+    st.floats(0.0, 0.4),
+    st.integers(1, MOST_LAYERS),
+)
+def test_a_layer_histogram_counts_every_pixel_once(
+    codes: list[int], tail: float, layers: int
+) -> None:
+    luminance = LINEAR[codes]
+    try:
+        medium = fit_attenuation(luminance, tail=tail)
+    except ValueError:
+        assume(False)
+    found = layer_histogram(luminance, tail=tail, layers=layers)
+    assert found.attenuation == medium
+    np.testing.assert_array_equal(found.boundaries, medium.boundaries(layers))
+    np.testing.assert_array_equal(found.histogram.counts, np.bincount(codes, minlength=256))
+    assert found.bright_tail == sum(value > medium.brightest for value in luminance)
+    assert found.dark_tail == sum(value < medium.darkest for value in luminance)
+    cut = Cut(luminance, medium, layers)
+    layer = [brute_force_layer(float(value), cut, "dropped") for value in luminance]
+    np.testing.assert_array_equal(
+        found.pixels_per_layer, [layer.count(n) for n in range(1, layers + 1)]
+    )
+    assert found.pixels_per_layer.dtype == np.int64
+
+
+@settings(deadline=None)
 @given(cuts(), st.floats(0.3, 3.0), st.sampled_from(TAILS))
 def test_a_gamma_cuts_the_photograph_into_the_same_layers(
     cut: Cut, gamma: float, tails: Tails
@@ -325,31 +363,3 @@ def test_a_photograph_of_one_luminance_is_refused(luminance: list[float], tail: 
     with pytest.raises(ValueError, match=message) as caught:
         fit_attenuation(np.array([luminance]), tail=tail)
     assert str(caught.value).count(". ") == 0
-
-
-# ---- darkness and true depth -----------------------------------------------------------------
-
-
-def brute_force_ranks(values: list[float]) -> list[float]:
-    """Average ranks: those below, and half of those that tie."""
-    return [
-        sum(other < value for other in values) + (values.count(value) - 1) / 2 for value in values
-    ]
-
-
-@settings(deadline=None)
-@given(st.lists(st.tuples(st.integers(1, 8), st.integers(0, 8)), min_size=4, max_size=40))
-def test_depth_rank_correlation_is_pearson_of_the_ranks(pairs: list[tuple[int, int]]) -> None:
-    darkness, depth = [-float(pair[0]) for pair in pairs], [float(pair[1]) for pair in pairs]
-    assume(len(set(darkness)) > 1)
-    assume(len(set(depth)) > 1)
-    expected = np.corrcoef(brute_force_ranks(darkness), brute_force_ranks(depth))[0, 1]
-    found = depth_rank_correlation(-np.array(darkness)[None], np.array(depth)[None])
-    assert found == pytest.approx(expected, abs=1e-12)
-
-
-def test_brightness_that_orders_the_depth_has_correlation_1() -> None:
-    depth = np.random.default_rng(0).random((8, 8))
-    luminance = Attenuation(0.9, 0.02).luminance_at(depth)
-    assert depth_rank_correlation(luminance, depth) == pytest.approx(1.0)
-    assert depth_rank_correlation(-luminance, depth) == pytest.approx(-1.0)

@@ -10,26 +10,27 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import luminance, to_8bit
+from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, Wrap, orbit
 from pipelines.photo_fur.attenuation import (
     Attenuation,
     Tails,
-    fit_attenuation,
     layer_masks,
     layer_of,
 )
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.figures import top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
     ROUND_VIEWS,
     SQUARE_VIEWS,
     View,
     draw_frames,
-    square_of_photograph,
-    top_view_error,
+    stretched_to_photograph,
+    top_view_size,
 )
-from pipelines.photo_fur.shells import shell_vertices
+from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
+from pipelines.photo_fur.shells import ShellMesh, shell_vertices
 
 FILLS: tuple[Fill, ...] = ("columns", "bands")
 THICKNESS = 0.1
@@ -37,21 +38,11 @@ SIZE = 24
 RED = (1.0, 0.0, 0.0)
 
 
-class Photograph(NamedTuple):
-    """A photograph and its medium."""
-
-    radiance: NDArray[np.float32]
-    luminance: NDArray[np.float32]
-    medium: Attenuation
-
-
-def random_photograph(seed: int, shape: tuple[int, int] = (SIZE, SIZE)) -> Photograph:
+def random_photograph(seed: int, shape: tuple[int, int] = (SIZE, SIZE)) -> FurPhotograph:
     """Random colours, evenly spread in sRGB; a tenth of the pixels is tail at each end."""
     encoded = np.random.default_rng(seed).random((*shape, 3))
     encoded *= np.random.default_rng(seed + 1).random((*shape, 1))
-    radiance = (encoded**2.2).astype(np.float32)
-    grey = luminance(radiance)
-    return Photograph(radiance, grey, fit_attenuation(grey, tail=0.1))
+    return fur_photograph((encoded**2.2).astype(np.float32), tail=0.1)
 
 
 class Skin(NamedTuple):
@@ -79,7 +70,7 @@ def flat_skin(segments: int = 2) -> Skin:
 
 
 def fur(
-    photo: Photograph,
+    photo: FurPhotograph,
     layers: int,
     *,
     fill: Fill,
@@ -95,14 +86,14 @@ def fur(
     shells = shell_vertices(skin.vertices, skin.normals, THICKNESS, layers)
     if only is not None:
         shells[np.arange(1, layers + 1) != only] += np.float32([50, 0, 0])
-    image = fur_texture(photo.radiance, photo.luminance, photo.medium, layers, tails=tails)
+    image = fur_texture(photo.radiance, photo.luminance, photo.attenuation, layers, tails=tails)
     return fur_surface(
         shells,
         skin.normals,
         skin.triangles,
         skin.uvs * repeats,
         image,
-        photo.medium,
+        photo.attenuation,
         fill=fill,
         wrap=wrap,
         interpolate=interpolate,
@@ -153,7 +144,9 @@ def test_beyond_its_edges_the_photograph_is_continued(wrap: Wrap, padding: Any, 
 def test_dropped_tails_show_the_background_exactly_there(layers: int, fill: Fill) -> None:
     photo = random_photograph(6)
     picture = drawn(fur(photo, layers, fill=fill, tails="dropped"))
-    dropped = (photo.luminance > photo.medium.brightest) | (photo.luminance < photo.medium.darkest)
+    dropped = (photo.luminance > photo.attenuation.brightest) | (
+        photo.luminance < photo.attenuation.darkest
+    )
     assert 0.1 < dropped.mean() < 0.25
     np.testing.assert_array_equal(picture[..., 3], ~dropped)
     np.testing.assert_array_equal(picture[dropped][:, :3], np.tile(RED, (dropped.sum(), 1)))
@@ -193,7 +186,7 @@ LAYERS = 6
 @pytest.mark.parametrize("tails", ["end layers", "dropped"])
 def test_a_layer_of_bands_shows_its_mask_and_nothing_else(tails: Tails) -> None:
     photo = random_photograph(8)
-    masks = layer_masks(layer_of(photo.luminance, photo.medium, LAYERS, tails=tails), LAYERS)
+    masks = layer_masks(layer_of(photo.luminance, photo.attenuation, LAYERS, tails=tails), LAYERS)
     whole = drawn(fur(photo, LAYERS, fill="bands", tails=tails))
     for number, mask in enumerate(masks, start=1):
         alone = drawn(fur(photo, LAYERS, fill="bands", tails=tails, only=number))
@@ -207,8 +200,8 @@ def test_a_layer_of_columns_shows_every_higher_layer_too_as_dark_as_the_medium(
 ) -> None:
     """A pixel's colour n - own layers further down is the colour times I(n) / I(own layer)."""
     photo = random_photograph(9)
-    brightest, darkest = photo.medium
-    own = layer_of(photo.luminance, photo.medium, LAYERS, tails=tails).astype(float)
+    brightest, darkest = photo.attenuation
+    own = layer_of(photo.luminance, photo.attenuation, LAYERS, tails=tails).astype(float)
     masks = layer_masks(own.astype(np.uint8), LAYERS)
     whole = drawn(fur(photo, LAYERS, fill="columns", tails=tails))[..., :3]
     for number in range(1, LAYERS + 1):
@@ -226,7 +219,7 @@ def test_every_luminance_is_shown_by_the_layer_that_holds_it(layers: int, fill: 
     """Every code of depth there is, at the first, a middle and the last layer."""
     medium = Attenuation(0.9, 0.01)
     grey = medium.luminance_at(np.linspace(-0.1, 1.1, SIZE * SIZE)).reshape(SIZE, SIZE)
-    photo = Photograph(np.repeat(grey[..., None], 3, axis=2), grey, medium)
+    photo = FurPhotograph(np.repeat(grey[..., None], 3, axis=2), grey, medium)
     own = layer_of(grey, medium, layers, tails="dropped")
     for number in sorted({1, (layers + 1) // 2, layers}):
         alone = drawn(fur(photo, layers, fill=fill, tails="dropped", only=number))
@@ -238,7 +231,7 @@ def test_from_the_side_bands_are_slices_and_columns_stand_on_the_skin() -> None:
     """Photograph: left half in the top layer, right half in the bottom one. Seen from the front."""
     grey = np.full((SIZE, SIZE), 0.1)
     grey[:, : SIZE // 2] = 0.9
-    photo = Photograph(np.repeat(grey[..., None], 3, axis=2), grey, Attenuation(0.9, 0.1))
+    photo = FurPhotograph(np.repeat(grey[..., None], 3, axis=2), grey, Attenuation(0.9, 0.1))
     # A little from above, so that a shell shows as a line; 1 unit is SIZE pixels.
     camera = orbit((0, 0, 0), 5, -90, 8, height=1)
     tall = 5 * THICKNESS
@@ -246,14 +239,14 @@ def test_from_the_side_bands_are_slices_and_columns_stand_on_the_skin() -> None:
     shells = shell_vertices(skin.vertices, skin.normals, tall, 4)
     pictures = {}
     for fill in FILLS:
-        image = fur_texture(photo.radiance, grey, photo.medium, 4, tails="end layers")
+        image = fur_texture(photo.radiance, grey, photo.attenuation, 4, tails="end layers")
         actor = fur_surface(
             shells,
             skin.normals,
             skin.triangles,
             skin.uvs,
             image,
-            photo.medium,
+            photo.attenuation,
             fill=fill,
             wrap="clamp",
             interpolate=False,
@@ -274,14 +267,16 @@ def test_from_the_side_bands_are_slices_and_columns_stand_on_the_skin() -> None:
 def test_one_actor_holds_all_shells_and_one_texture() -> None:
     photo, skin, layers = random_photograph(10), flat_skin(3), 15
     shells = shell_vertices(skin.vertices, skin.normals, THICKNESS, layers)
-    image = fur_texture(photo.radiance, photo.luminance, photo.medium, layers, tails="end layers")
+    image = fur_texture(
+        photo.radiance, photo.luminance, photo.attenuation, layers, tails="end layers"
+    )
     actor = fur_surface(
         shells,
         skin.normals,
         skin.triangles,
         skin.uvs,
         image,
-        photo.medium,
+        photo.attenuation,
         fill="columns",
         wrap="mirrored",
         interpolate=True,
@@ -303,11 +298,11 @@ def test_one_actor_holds_all_shells_and_one_texture() -> None:
 
 def test_the_texture_is_the_photograph_with_the_depth_in_alpha() -> None:
     photo = random_photograph(11, (5, 7))
-    image = fur_texture(photo.radiance, photo.luminance, photo.medium, 10, tails="dropped")
+    image = fur_texture(photo.radiance, photo.luminance, photo.attenuation, 10, tails="dropped")
     assert image.dtype == np.uint8
     assert image.shape == (5, 7, 4)
     np.testing.assert_array_equal(image[..., :3], to_8bit(photo.radiance))
-    own = layer_of(photo.luminance, photo.medium, 10, tails="dropped").astype(int)
+    own = layer_of(photo.luminance, photo.attenuation, 10, tails="dropped").astype(int)
     np.testing.assert_array_equal(image[..., 3] // 25 + 1, np.where(own == 0, 11, own))
 
 
@@ -315,7 +310,7 @@ def test_the_texture_is_the_photograph_with_the_depth_in_alpha() -> None:
 
 
 def frames_of(
-    photo: Photograph,
+    photo: FurPhotograph,
     skin: Skin,
     views: tuple[View, ...],
     *,
@@ -327,16 +322,12 @@ def frames_of(
     heard: list[float] | None = None,
 ) -> Any:
     shells = shell_vertices(skin.vertices, skin.normals, thickness, layers)
+    mesh = ShellMesh(shells, skin.normals, skin.triangles, skin.uvs, thickness)
     if skin.vertices[:, 2].max() == 0:
-        shells = square_of_photograph(shells, photo.luminance.shape)
+        mesh = stretched_to_photograph(mesh, photo)
     return draw_frames(
-        photo.radiance,
-        photo.luminance,
-        photo.medium,
-        shells,
-        skin.normals,
-        skin.triangles,
-        skin.uvs,
+        photo,
+        mesh,
         views,
         size=size,
         supersampling=supersampling,
@@ -354,7 +345,7 @@ def test_the_square_is_shown_from_above_and_from_the_side(shape: tuple[int, int]
     assert frames.pictures.shape == (2, *shape, 3)
     assert frames.pictures.dtype == np.uint8
     np.testing.assert_array_equal(frames.pictures[0], to_8bit(photo.radiance))
-    assert top_view_error(frames.pictures[0], photo.radiance) == 0.0
+    assert top_view_rmse(frames.pictures[0], photo.radiance) == 0.0
     assert frames.coverage[0] == 1.0
     assert 0.05 < frames.coverage[1] < 0.95
     assert heard == [0.0, 0.5]
@@ -375,7 +366,7 @@ def test_coverage_is_the_share_of_pixels_that_are_not_background() -> None:
     background = to_8bit(BACKGROUND)
     expected = (frames.pictures != background).any(axis=-1).mean(axis=(1, 2))
     np.testing.assert_allclose(frames.coverage, expected, atol=1e-12)
-    kept = layer_of(photo.luminance, photo.medium, 5, tails="dropped") > 0
+    kept = layer_of(photo.luminance, photo.attenuation, 5, tails="dropped") > 0
     exact = frames_of(photo, flat_skin(), SQUARE_VIEWS[:1], tails="dropped").coverage[0]
     assert exact == kept.mean()
 
@@ -401,8 +392,7 @@ def test_round_views_show_the_four_sides_whole_and_in_their_order() -> None:
     colours = np.array([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9], [0.9, 0.9, 0.1]])
     side = np.round(np.arange(64) / 16).astype(int) % 4
     radiance = np.tile(colours[side], (32, 1, 1)).astype(np.float32)
-    grey = luminance(radiance)
-    photo = Photograph(radiance, grey, fit_attenuation(grey, tail=0.0))
+    photo = fur_photograph(radiance, tail=0.0)
     frames = frames_of(photo, sphere(), ROUND_VIEWS, size=(60, 60), thickness=0.05)
     assert [view.azimuth for view in ROUND_VIEWS] == [-90, 0, 90, 180]
     for view, picture in zip(ROUND_VIEWS, frames.pictures, strict=True):
@@ -426,23 +416,19 @@ def test_fur_of_more_layers_and_thickness_covers_more_and_never_leaves_the_pictu
         assert not covered[:, [0, -1]].any()
 
 
-def test_top_view_error_is_the_rmse_of_the_codes() -> None:
-    rng = np.random.default_rng(15)
-    radiance = rng.random((4, 5, 3)).astype(np.float32)
-    picture = rng.integers(0, 256, (4, 5, 3), dtype=np.uint8)
-    squares = [
-        ((int(a) - int(b)) / 255) ** 2
-        for a, b in zip(picture.ravel(), to_8bit(radiance).ravel(), strict=True)
-    ]
-    expected = math.sqrt(sum(squares) / len(squares))
-    assert top_view_error(picture, radiance) == pytest.approx(expected, rel=1e-12)
-    assert top_view_error(to_8bit(radiance), radiance) == 0.0
-    white, black = np.ones((2, 2, 3), np.float32), np.zeros((2, 2, 3), np.uint8)
-    assert top_view_error(black, white) == 1.0
-
-
 def test_the_square_gets_the_photographs_proportions() -> None:
-    corners = np.array([[0, 0, 0], [1, 1, 0.2]])
-    stretched = square_of_photograph(corners, (300, 450))
-    assert stretched.dtype == np.float32
-    np.testing.assert_allclose(stretched, [[0, 0, 0], [1.5, 1, 0.2]], rtol=1e-6)
+    corners = np.array([[[0, 0, 0], [1, 1, 0.2]]], np.float32)
+    none = np.empty((0, 3))
+    photo = random_photograph(18, (30, 45))
+    stretched = stretched_to_photograph(ShellMesh(corners, none, none, none, 0.2), photo)
+    assert stretched.vertices.dtype == np.float32
+    np.testing.assert_allclose(stretched.vertices, [[[0, 0, 0], [1.5, 1, 0.2]]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(24, 24), (100, 60), (384, 500), (383, 900), (2000, 3000)])
+def test_small_photographs_are_shown_in_squares_of_pixels(shape: tuple[int, int]) -> None:
+    height, width = top_view_size(shape)
+    times = height // shape[0]
+    assert (height, width) == (times * shape[0], times * shape[1])
+    assert times == 1 or min(height, width) <= 384
+    assert min(height, width) + min(shape) > 384  # one time more would be too large

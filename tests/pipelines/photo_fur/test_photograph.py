@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.photo_fur.photograph import HIGHLIGHT_SHARE, expose, fit_size
+from pipelines.photo_fur.attenuation import fit_attenuation
+from pipelines.photo_fur.photograph import HIGHLIGHT_SHARE, expose, fit_size, fur_photograph
 
 
 def test_a_photograph_inside_the_display_stays_as_it_is() -> None:
@@ -99,3 +100,17 @@ def test_a_photograph_that_fits_is_not_touched() -> None:
         fitted = fit_size(radiance, largest)
         assert fitted.dtype == np.float32
         np.testing.assert_array_equal(fitted, radiance.astype(np.float32))
+
+
+# ---- luminance and medium --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tail", [0.0, 0.2])
+def test_a_photograph_gets_its_luminance_and_the_medium_of_that(tail: float) -> None:
+    radiance = np.random.default_rng(5).random((20, 30, 3)).astype(np.float32)
+    photograph = fur_photograph(radiance, tail=tail)
+    assert photograph.radiance is radiance
+    assert photograph.luminance.dtype == np.float32
+    expected = radiance.astype(float) @ [0.2126, 0.7152, 0.0722]
+    np.testing.assert_allclose(photograph.luminance, expected, rtol=1e-6)
+    assert photograph.attenuation == fit_attenuation(photograph.luminance, tail=tail)

@@ -10,8 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import MOST_LAYERS
-from pipelines.photo_fur.shells import shell_heights, shell_vertices
+from pipelines.photo_fur.shells import (
+    make_shell_mesh,
+    shell_heights,
+    shell_vertices,
+    usual_thickness,
+)
 
 
 @settings(deadline=None)
@@ -58,6 +64,27 @@ def test_shells_of_a_sphere_are_spheres() -> None:
     radii = np.linalg.norm(shell_vertices(points, points, 0.5, 5), axis=2)
     expected = np.array([1.4, 1.3, 1.2, 1.1, 1.0])
     np.testing.assert_allclose(radii, np.tile(expected[:, None], (1, 200)), rtol=1e-6)
+
+
+def test_a_shell_mesh_is_the_mesh_with_its_shells() -> None:
+    mesh = shapes.sphere(12)
+    shells = make_shell_mesh(mesh, 5, thickness=0.4, repeats=2.5)
+    np.testing.assert_array_equal(
+        shells.vertices, shell_vertices(mesh.vertices, mesh.normals, 0.4, 5)
+    )
+    np.testing.assert_array_equal(shells.normals, mesh.normals)
+    np.testing.assert_array_equal(shells.triangles, mesh.triangles)
+    np.testing.assert_array_equal(shells.uvs, 2.5 * mesh.uvs)
+    assert shells.layers == 5
+    np.testing.assert_array_equal(shells.heights, shell_heights(0.4, 5))
+
+
+def test_the_usual_thickness_is_6_percent_of_the_radius_wherever_the_mesh_stands() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 8.0, 0.0]])
+    for place in (0.0, [3.0, -7.0, 100.0]):
+        assert usual_thickness(corners + place) == pytest.approx(0.06 * 5.0)
+    mesh = shapes.teapot(4)
+    assert make_shell_mesh(mesh, 3).thickness == usual_thickness(mesh.vertices)
 
 
 @pytest.mark.parametrize("thickness", [math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0])

@@ -1,0 +1,134 @@
+"""Stored datasets of this system and the objects of `pipelines`, in both directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from pipelines.drawing.colour import luminance
+from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
+from pipelines.photo_fur.photograph import FurPhotograph
+from pipelines.photo_fur.shells import ShellMesh
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from pipelines.photo_fur.frames import Frames, View
+
+_PIXELS = ("y", "x")
+
+
+def photograph_dataset(
+    radiance: NDArray[np.float32], name: str, depth: NDArray[np.float32] | None = None
+) -> xr.Dataset:
+    """`fur_photo` of a photograph (y, x, 3) and, where it is known, the depth (y, x)."""
+    import xarray as xr
+
+    variables = {
+        "radiance": ((*_PIXELS, "channel"), radiance),
+        "luminance": (_PIXELS, luminance(radiance)),
+    }
+    if depth is not None:
+        variables["depth"] = (_PIXELS, depth)
+    return xr.Dataset(variables, attrs={"name": name})
+
+
+def photograph_of(fur_photo: xr.Dataset, attenuation: xr.Dataset) -> FurPhotograph:
+    """The photograph with its medium, as it is drawn."""
+    return FurPhotograph(
+        fur_photo["radiance"].values, fur_photo["luminance"].values, attenuation_of(attenuation)
+    )
+
+
+def attenuation_dataset(
+    found: LayerHistogram, depth_rank_correlation: float | None = None
+) -> xr.Dataset:
+    """`attenuation` of a histogram and, where the true depth is known, the correlation with it."""
+    import numpy as np
+    import xarray as xr
+
+    variables = {
+        "histogram": ("bin", found.histogram.counts),
+        "bin_edge": ("edge", found.histogram.edges),
+        "brightest": ((), found.attenuation.brightest),
+        "darkest": ((), found.attenuation.darkest),
+        "attenuation": ((), found.attenuation.coefficient),
+        "boundary_luminance": ("boundary", found.boundaries),
+        "pixels_per_layer": ("layer", found.pixels_per_layer),
+        "bright_tail": ((), np.int64(found.bright_tail)),
+        "dark_tail": ((), np.int64(found.dark_tail)),
+    }
+    if depth_rank_correlation is not None:
+        variables["depth_rank_correlation"] = ((), depth_rank_correlation)
+    return xr.Dataset(variables)
+
+
+def attenuation_of(dataset: xr.Dataset) -> Attenuation:
+    """The medium that an `attenuation` dataset describes."""
+    return Attenuation(float(dataset["brightest"]), float(dataset["darkest"]))
+
+
+def shell_stack_dataset(stack: ShellStack) -> xr.Dataset:
+    """`shell_stack` of a photograph's layers."""
+    import xarray as xr
+
+    return xr.Dataset({"layer": (_PIXELS, stack.layer), "mask": (("shell", *_PIXELS), stack.masks)})
+
+
+def shell_stack_of(dataset: xr.Dataset) -> ShellStack:
+    """The layers that a `shell_stack` dataset holds."""
+    return ShellStack(dataset["layer"].values, dataset["mask"].values)
+
+
+def shell_mesh_dataset(mesh: ShellMesh, name: str) -> xr.Dataset:
+    """`shell_mesh` of a mesh with its shells."""
+    import numpy as np
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "vertices": (("shell", "vertex", "axis"), mesh.vertices),
+            "normals": (("vertex", "axis"), mesh.normals.astype(np.float32)),
+            "triangles": (("triangle", "corner"), mesh.triangles.astype(np.int32)),
+            "uvs": (("vertex", "uv"), mesh.uvs.astype(np.float32)),
+            "height": ("shell", mesh.heights),
+            "thickness": ((), mesh.thickness),
+        },
+        attrs={"name": name},
+    )
+
+
+def shell_mesh_of(dataset: xr.Dataset) -> ShellMesh:
+    """The mesh with its shells that a `shell_mesh` dataset holds."""
+    return ShellMesh(
+        dataset["vertices"].values,
+        dataset["normals"].values,
+        dataset["triangles"].values,
+        dataset["uvs"].values,
+        float(dataset["thickness"]),
+    )
+
+
+def frames_dataset(frames: Frames, views: Sequence[View]) -> xr.Dataset:
+    """`fur_frames` of the pictures from these views."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "frames": (("view", *_PIXELS, "channel"), frames.pictures),
+            "azimuth": ("view", [view.azimuth for view in views]),
+            "elevation": ("view", [view.elevation for view in views]),
+            "coverage": ("view", frames.coverage),
+        }
+    )
+
+
+LOADERS: dict[str, Callable[[StoredVersion], object]] = {
+    "attenuation": lambda version: photograph_of(version.input("fur_photo"), version.dataset),
+    "shell_stack": lambda version: shell_stack_of(version.dataset),
+    "shell_mesh": lambda version: shell_mesh_of(version.dataset),
+}
+"""What ``tsuya.load`` gives, by asset: the photograph with its medium, its layers, the mesh."""

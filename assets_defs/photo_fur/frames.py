@@ -1,0 +1,127 @@
+"""Pictures of the fur on the mesh: `fur_frames`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from pydantic import Field
+
+from assets_defs.checks import Check
+from assets_defs.photo_fur.datasets import frames_dataset, photograph_of, shell_mesh_of
+from assets_defs.photo_fur.declaration import FUR, SQUARE
+from assets_defs.settings import Preset, Settings
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.photo_fur import figures
+from pipelines.photo_fur.attenuation import Tails
+from pipelines.photo_fur.drawing import Fill
+from storage.schemas import photo_fur as schemas
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class FrameSettings(Settings):
+    """How the pictures are taken."""
+
+    width: int = Field(
+        640,
+        ge=32,
+        le=4096,
+        description="Pixels across, 4:3; the square's pictures go by the photograph's size",
+    )
+    supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
+    tails: Tails = "end layers"
+    fill: Fill = Field(
+        "columns", description="Layers show whole hairs (columns) or, as in the paper, bands"
+    )
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"width": 96, "supersampling": 1},
+        "paper": {"width": 1280, "supersampling": 3},
+    }
+
+
+def _pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.drawing.contact_sheet import contact_sheet
+
+    return {"frames": contact_sheet(dataset["frames"].values)}
+
+
+def _top_view_rmse(version: StoredVersion) -> float | None:
+    from_above = version.dataset["elevation"].values == 90.0
+    if not from_above.any():
+        return None
+    picture = version.dataset["frames"].values[from_above][0]
+    return figures.top_view_rmse(picture, version.input("fur_photo")["radiance"].values)
+
+
+def _least_coverage(version: StoredVersion) -> float:
+    return float(version.dataset["coverage"].min())
+
+
+def _mean_brightness(version: StoredVersion) -> float:
+    return figures.mean_brightness(version.dataset["frames"].values)
+
+
+@FUR.asset(
+    schemas.FUR_FRAMES,
+    by=("photo", "mesh"),
+    settings=FrameSettings,
+    inputs=("fur_photo", "attenuation", "shell_mesh"),
+    kinds=frozenset({"zarr", "pyvista"}),
+    pictures=_pictures,
+    checks=(
+        Check(
+            "top_view_rmse",
+            "RMSE in [0, 1] between the square from straight above and the photograph.",
+            _top_view_rmse,
+            at_most=0.02,
+            change=0.002,
+        ),
+        Check(
+            "least_coverage",
+            "Share of the picture with fur, in the view that has least: nothing drawn is 0.",
+            _least_coverage,
+            at_least=0.02,
+            change=0.01,
+        ),
+        Check(
+            "mean_brightness",
+            "Mean of all pictures' 8-bit codes, in [0, 1].",
+            _mean_brightness,
+            at_least=0.02,
+            at_most=0.98,
+            change=0.01,
+        ),
+    ),
+)
+def fur_frames(
+    settings: FrameSettings,
+    keys: Mapping[str, str],
+    progress: Progress,
+    fur_photo: xr.Dataset,
+    attenuation: xr.Dataset,
+    shell_mesh: xr.Dataset,
+) -> Result:
+    """Draw the fur on the mesh from every view."""
+    from pipelines.photo_fur import frames
+
+    photograph = photograph_of(fur_photo, attenuation)
+    mesh = shell_mesh_of(shell_mesh)
+    views, size = frames.ROUND_VIEWS, (settings.width * 3 // 4, settings.width)
+    if keys["mesh"] == SQUARE:
+        mesh = frames.stretched_to_photograph(mesh, photograph)
+        views, size = frames.SQUARE_VIEWS, frames.top_view_size(photograph.luminance.shape)
+    drawn = frames.draw_frames(
+        photograph,
+        mesh,
+        views,
+        size=size,
+        supersampling=settings.supersampling,
+        tails=settings.tails,
+        fill=settings.fill,
+        progress=progress,
+    )
+    return frames_dataset(drawn, views), {"views": len(views)}

@@ -1,0 +1,111 @@
+"""The photograph of the fur: `fur_photo`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from pydantic import Field
+
+from assets_defs.checks import Check
+from assets_defs.photo_fur.datasets import photograph_dataset
+from assets_defs.photo_fur.declaration import FUR, PELT
+from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.photo_fur import figures
+from storage.schemas import photo_fur as schemas
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+
+class PhotoSettings(Settings):
+    """How the photograph is taken in."""
+
+    crop: tuple[int, int, int, int] | None = Field(
+        None, description="Left, top, width, height in pixels; the whole photograph by default"
+    )
+    largest_side: int = Field(
+        1024, ge=64, le=8192, description="Longer side in pixels; larger photographs are averaged"
+    )
+    pelt_size: int = Field(512, ge=64, le=2048, description="Virtual pelt: pixels a side")
+    pelt_hairs: int = Field(16_000, ge=100, le=100_000, description="Virtual pelt: hairs")
+    pelt_samples: int = Field(24, ge=1, le=4096, description="Virtual pelt: light paths a pixel")
+    pelt_seed: int = Field(0, ge=0, description="Virtual pelt: seed")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"largest_side": 128, "pelt_size": 64, "pelt_hairs": 280, "pelt_samples": 16},
+        "paper": {"largest_side": 4096, "pelt_samples": 64},
+    }
+
+
+def _pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.drawing.colour import to_8bit
+
+    return {"photograph": to_8bit(dataset["radiance"].values)}
+
+
+def _contrast(version: StoredVersion) -> float:
+    return figures.contrast(version.dataset["luminance"].values)
+
+
+def _clipped_share(version: StoredVersion) -> float:
+    return figures.clipped_share(version.dataset["radiance"].values)
+
+
+def _read(source: Source, settings: PhotoSettings) -> NDArray[np.float32]:
+    """A photograph of the user's or a built-in one, exposed and brought to size."""
+    from pipelines.photo_fur.photograph import expose, fit_size
+    from storage.readers.photographs import builtin_photograph, read_photograph
+
+    raw = (
+        builtin_photograph(source.key)
+        if source.path is None
+        else read_photograph(source.path, settings.crop)
+    )
+    return fit_size(expose(raw), settings.largest_side)
+
+
+@FUR.asset(
+    schemas.FUR_PHOTO,
+    by=("photo",),
+    settings=PhotoSettings,
+    from_source=True,
+    pictures=_pictures,
+    checks=(
+        Check(
+            "contrast",
+            "Michelson contrast of the 1 % and 99 % luminances: a flat photograph has no depth.",
+            _contrast,
+            at_least=0.1,
+            change=0.02,
+        ),
+        Check(
+            "clipped_share",
+            "Share of the pixels that are pure white: their brightness tells no depth.",
+            _clipped_share,
+            at_most=0.05,
+            change=0.005,
+        ),
+    ),
+)
+def fur_photo(settings: PhotoSettings, source: Source, progress: Progress) -> Result:
+    """Read the photograph, or photograph the virtual pelt."""
+    from pipelines.virtual.pelt.pelt import virtual_pelt
+
+    if source.path is None and source.key == PELT:
+        radiance, depth = virtual_pelt(
+            settings.pelt_size,
+            settings.pelt_hairs,
+            settings.pelt_samples,
+            settings.pelt_seed,
+            progress=progress,
+        )
+        dataset = photograph_dataset(radiance, source.name, depth)
+    else:
+        dataset = photograph_dataset(_read(source, settings), source.name)
+    return dataset, {"pixels": dataset["luminance"].size}
