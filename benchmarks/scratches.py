@@ -28,7 +28,8 @@ from pipelines.glass_scratches.tables.scratch_table import (
     lean_factors,
     scratch_table,
 )
-from pipelines.light import environments
+from pipelines.light.built_in_environments import lamps, sky
+from pipelines.light.environment_sampling import make_environment_sampler
 
 BINS, RAYS, PATHS = 256, 10_000, 100
 """The paper's M, N, Nr."""
@@ -153,7 +154,7 @@ def _setting_2() -> Surface:
 def _sampling() -> dict[str, float]:
     """Variance over the seeds of the pixels that show scratches, times the rays it took."""
     solid, surface = plate(1.5, 1.1, 0.05), _setting_2()
-    light = environments.sampler(environments.sky(256, sun_azimuth=-115.0, sun_elevation=38.0))
+    light = make_environment_sampler(sky(256, sun_azimuth=-115.0, sun_elevation=38.0))
     camera = cameras(solid)[1]
 
     def pictures(strategy: Strategy) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
@@ -190,7 +191,7 @@ def _sampling() -> dict[str, float]:
 def _rendering() -> dict[str, float]:
     """The plate, setting 2, from far, among lamps."""
     solid, surface = plate(1.5, 1.1, 0.05), _setting_2()
-    light = environments.sampler(environments.lamps(512))
+    light = make_environment_sampler(lamps(512))
     camera = cameras(solid)[0]
     started = time.perf_counter()
     trace(

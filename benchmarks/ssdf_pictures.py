@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from PIL import Image
-
 from assets_defs.ssdf_lighting.compression import decoder_of_basis
+from PIL import Image
+from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
+
 from assets_defs.ssdf_lighting.frames import FrameSettings
 from assets_defs.ssdf_lighting.lights import LightSettings
 from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.workspace import CHECKOUT
-from pipelines.light import environments
-from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
+from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting.drawing import frames
 from pipelines.ssdf_lighting.drawing.pictures import error_map
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
@@ -33,7 +33,7 @@ PICTURE = CHECKOUT / "docs" / "pictures" / "ssdf-mitsuba.png"
 def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """Frames a second while the light turns, PSNR, and the picture of where Mitsuba differs."""
     scene, settings, look = scene_of(stored("scene_mesh")), LightSettings(), FrameSettings()
-    sky = environments.sky(
+    sky = built_in_environments.sky(
         256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
     )
     lights = fit_lights(

@@ -170,18 +170,19 @@ def _read_environment(name: str) -> NDArray[np.float32]:
 
 def environment(settings: FrameSettings) -> NDArray[np.float32]:
     """The environment's radiance (H, 2 H, 3), turned. Raises as `check_environment_setting`."""
-    from pipelines.light import environments
+    from pipelines.light import built_in_environments
+    from pipelines.light.environment_maps import rotate_environment
 
     height = _ENVIRONMENT_HEIGHT
     if settings.environment == "lamps":
-        radiance = environments.lamps(height)
+        radiance = built_in_environments.lamps(height)
     elif settings.environment == "sky":
-        radiance = environments.sky(height, sun_azimuth=-115.0, sun_elevation=38.0)
+        radiance = built_in_environments.sky(height, sun_azimuth=-115.0, sun_elevation=38.0)
     elif settings.environment == "uniform":
-        radiance = environments.uniform(8)
+        radiance = built_in_environments.uniform(8)
     else:
         radiance = _read_environment(settings.environment)
-    return environments.rotated(radiance, settings.turn)
+    return rotate_environment(radiance, settings.turn)
 
 
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
@@ -307,7 +308,7 @@ def glass_frames(
     from pipelines.glass_scratches.layers.scratch_layers import layer_arrays
     from pipelines.glass_scratches.tables.sampling import lobe_of
     from pipelines.glass_scratches.tables.scratch_table import Lean
-    from pipelines.light.environments import sampler
+    from pipelines.light.environment_sampling import make_environment_sampler
 
     solid = Solid(
         glass_object["vertices"].values,
@@ -340,7 +341,7 @@ def glass_frames(
         index=index,
         tile=settings.tile,
     )
-    light = sampler(environment(settings))
+    light = make_environment_sampler(environment(settings))
     views = trace_frames(
         solid,
         surface,

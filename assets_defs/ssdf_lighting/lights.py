@@ -73,7 +73,7 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
     from pipelines.drawing.colour import exposure, to_8bit
-    from pipelines.light.environments import texel_directions
+    from pipelines.light.environment_maps import texel_directions
     from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
 
     radiance = dataset["radiance"].values
@@ -119,20 +119,20 @@ def environment_lights(
     """Fit spherical Gaussians to the environment."""
     import xarray as xr
 
-    from pipelines.light import environments
+    from pipelines.light import built_in_environments
     from pipelines.ssdf_lighting.light.environment_fit import averaged, fit_lights, flux_error
     from storage.readers.environments import read_environment
 
     if source.path is not None:
         radiance = read_environment(source.path)
     elif source.key == "sky":
-        radiance = environments.sky(
+        radiance = built_in_environments.sky(
             _HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
         )
     elif source.key == "lamps":
-        radiance = environments.lamps(_HEIGHT)
+        radiance = built_in_environments.lamps(_HEIGHT)
     else:
-        radiance = environments.uniform(8)
+        radiance = built_in_environments.uniform(8)
     small = averaged(radiance, _STORED)
     found = fit_lights(
         small,

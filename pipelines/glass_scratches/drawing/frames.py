@@ -14,7 +14,9 @@ from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing.path_tracing import Picture, Surface, trace
 from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw
-from pipelines.light.environments import Sampler, rotated, sampler, solid_angles, uniform
+from pipelines.light.built_in_environments import uniform
+from pipelines.light.environment_maps import rotate_environment, solid_angles
+from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
 
 _VIEW_ANGLE = 30.0
 _AZIMUTH, _ELEVATION = -68.0, 14.0
@@ -50,7 +52,7 @@ def cameras(solid: Solid) -> tuple[Camera, Camera]:
     return far, close
 
 
-def exposure(light: Sampler) -> float:
+def exposure(light: EnvironmentSampler) -> float:
     """Factor that shows a white matt surface, lit evenly by all of the environment, as 0.35: equal
     for all scratches in the same light."""
     bright = luminance(light.radiance.astype(np.float64))
@@ -62,7 +64,7 @@ def trace_frames(
     solid: Solid,
     surface: Surface,
     actor: ScratchedActor,
-    light: Sampler,
+    light: EnvironmentSampler,
     *,
     size: int,
     samples: int,
@@ -97,7 +99,7 @@ def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
     return trace(
         solid,
         surface,
-        sampler(uniform(8)),
+        make_environment_sampler(uniform(8)),
         cameras(solid)[0],
         width=FURNACE_SIZE,
         height=FURNACE_SIZE,
@@ -109,7 +111,7 @@ def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
 def moving_light(
     solid: Solid,
     actor: ScratchedActor,
-    light: Sampler,
+    light: EnvironmentSampler,
     *,
     count: int,
     size: int,
@@ -120,7 +122,9 @@ def moving_light(
     pictures = []
     for number in range(count):
         progress(number / count)
-        turned = sampler(rotated(light.radiance, 360.0 * number / count))
+        turned = make_environment_sampler(
+            rotate_environment(light.radiance, 360.0 * number / count)
+        )
         drawn = draw(actor, turned, camera, width=size, height=size, supersampling=2)
         pictures.append(drawn[..., :3])
     return to_8bit(np.stack(pictures) * exposure(light))

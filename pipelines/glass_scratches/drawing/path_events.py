@@ -15,7 +15,8 @@ from pipelines.glass_scratches.drawing.path_numbers import mixed, path_numbers, 
 from pipelines.glass_scratches.layers.kernels import LayerArrays, filtered_coverage, scratch_at
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.sampling import Lobe, bin_of
-from pipelines.light.environments import density_of, radiance_of, sample_direction
+from pipelines.light.environment_lookup import radiance_from_direction
+from pipelines.light.environment_sampling import direction_pdf, sample_direction
 
 DEEPEST = 24
 """Events of a path at most."""
@@ -159,10 +160,10 @@ def _event(  # type: ignore[no-untyped-def]
     number, seed = paths.number[i], paths.seed[i]
     way, weight = paths.way[i], paths.weight[i]
     if triangle < 0:
-        r, g, b = radiance_of(environment.radiance, way[0], way[1], way[2])
+        r, g, b = radiance_from_direction(environment.radiance, way[0], way[1], way[2])
         share = 1.0
         if paths.density[i] > 0.0 and not uniform:
-            other = density_of(environment.density, way[0], way[1], way[2])
+            other = direction_pdf(environment.density, way[0], way[1], way[2])
             share = paths.density[i] / (paths.density[i] + other)
         outcome.gathered[number, 0] += weight[0] * r * share
         outcome.gathered[number, 1] += weight[1] * g * share
@@ -335,7 +336,7 @@ def _inward(  # type: ignore[no-untyped-def]
             if outer2 > 1e-9:  # it would leave through such a face
                 outer = np.sqrt(outer2)
                 seen = index * (from_here - inner * axis) + np.sign(inner) * outer * axis
-                there = density_of(environment.density, seen[0], seen[1], seen[2])
+                there = direction_pdf(environment.density, seen[0], seen[1], seen[2])
                 density += 0.5 / axes * there * index * index * abs(inner) / outer
     return (way * along).sum(), (way * across).sum(), -below, density
 
@@ -432,7 +433,7 @@ def _scatter(  # type: ignore[no-untyped-def]
                 own = i_n / np.pi
             gain = scale / (density + out_chance * own)
             if gain > 0.0:
-                r, g, b = radiance_of(environment.radiance, ex, ey, ez)
+                r, g, b = radiance_from_direction(environment.radiance, ex, ey, ez)
                 outcome.towards[i, 0], outcome.towards[i, 1], outcome.towards[i, 2] = ex, ey, ez
                 outcome.offered[i, 0] = paths.weight[i, 0] * gain * r
                 outcome.offered[i, 1] = paths.weight[i, 1] * gain * g

@@ -45,7 +45,7 @@ from pipelines.glass_scratches.layers.scratch_layers import flatten_pyramid, pyr
 from pipelines.glass_scratches.tables.bins import bin_weights
 from pipelines.glass_scratches.tables.sampling import Lobe
 from pipelines.glass_scratches.tables.scratch_table import Lean, check_index, interpolated_factor
-from pipelines.light.environments import Sampler
+from pipelines.light.environment_sampling import EnvironmentSampler
 
 if TYPE_CHECKING:
     from pipelines.drawing.stage import Camera
@@ -111,7 +111,7 @@ def _mean_factor(lean: Lean) -> float:
 def trace(
     solid: Solid,
     surface: Surface,
-    environment: Sampler,
+    environment: EnvironmentSampler,
     camera: Camera,
     *,
     width: int,

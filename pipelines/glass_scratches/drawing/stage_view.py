@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera, Shader, Stage, surface, texture
 from pipelines.glass_scratches.tables.scratch_table import Lean
-from pipelines.light.environments import Sampler, sample
+from pipelines.light.environment_sampling import EnvironmentSampler, sample_directions
 
 if TYPE_CHECKING:
     from pipelines.geometry.solids import Solid
@@ -74,7 +74,7 @@ class ScratchedActor:
         self._angles = [float(angle) for angle in angles]
         self._index, self._tile = index, tile
 
-    def actor(self, environment: Sampler, camera: Camera) -> Any:
+    def actor(self, environment: EnvironmentSampler, camera: Camera) -> Any:
         """The actor as this camera sees it in this environment."""
         lights, through = _lights(environment)
         position = np.asarray(camera.position)
@@ -174,7 +174,7 @@ float angleOf(vec3 d, vec3 across, vec3 up) {{
 
 def draw(
     actor: ScratchedActor,
-    environment: Sampler,
+    environment: EnvironmentSampler,
     camera: Camera,
     *,
     width: int,
@@ -190,15 +190,15 @@ def draw(
         return stage.radiance()
 
 
-def _lights(environment: Sampler) -> tuple[NDArray[np.float32], float]:
+def _lights(environment: EnvironmentSampler) -> tuple[NDArray[np.float32], float]:
     """Lights drawn from the environment as a picture of two rows (power; direction), row 0 on top,
     and the mean radiance all around, which stands for what comes through the glass."""
-    from pipelines.light.environments import evaluate
+    from pipelines.light.environment_lookup import radiance_from_directions
 
     index = np.arange(LIGHTS)
     u = np.stack([(index + 0.5) / LIGHTS, (index * 0.6180339887498949) % 1.0], axis=-1)
-    towards, density = sample(environment, u)
-    power = evaluate(environment.radiance, towards) / (density * LIGHTS)[:, None]
+    towards, density = sample_directions(environment, u)
+    power = radiance_from_directions(environment.radiance, towards) / (density * LIGHTS)[:, None]
     # texelFetch counts rows from the bottom of the texture: row 1 of the picture is row 0 there.
     rows = np.stack([towards, power]).astype(np.float32)
     return np.ascontiguousarray(rows), float(power.mean(axis=1).sum() / (4 * np.pi))

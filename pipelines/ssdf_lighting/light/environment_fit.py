@@ -23,7 +23,7 @@ from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from pipelines.drawing.colour import luminance
-from pipelines.light.environments import check_environment, solid_angles, texel_directions
+from pipelines.light.environment_maps import check_environment, solid_angles, texel_directions
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate, integral
 
 FloatArray = NDArray[np.float64]

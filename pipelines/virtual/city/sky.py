@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.light.environments import texel_directions
+from pipelines.light.environment_maps import texel_directions
 
 _CLOUDS = 512
 

@@ -33,7 +33,10 @@ from pipelines.glass_scratches.tables.scratch_table import (
     lean_factors,
     scratch_table,
 )
-from pipelines.light.environments import Radiance, Sampler, evaluate, sampler, sky, uniform
+from pipelines.light.built_in_environments import sky, uniform
+from pipelines.light.environment_lookup import radiance_from_directions
+from pipelines.light.environment_maps import Radiance
+from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
 
 Floats = NDArray[np.float64]
 
@@ -78,11 +81,11 @@ def surface(
     )
 
 
-def halves(front: float, back: float) -> Sampler:
+def halves(front: float, back: float) -> EnvironmentSampler:
     """One radiance from where y < 0, another from where y > 0."""
     radiance = np.empty((16, 32, 3), np.float32)
     radiance[:, :16], radiance[:, 16:] = back, front
-    return sampler(radiance)
+    return make_environment_sampler(radiance)
 
 
 def facing(degrees: float = 0.0, height: float = 0.5) -> Camera:
@@ -93,7 +96,7 @@ def facing(degrees: float = 0.0, height: float = 0.5) -> Camera:
 def picture(
     solid: Solid,
     made: Surface,
-    light: Sampler,
+    light: EnvironmentSampler,
     camera: Camera,
     *,
     size: int = 16,
@@ -208,11 +211,13 @@ def test_a_clear_plate_cannot_be_seen_in_even_light(pane: Solid, degrees: float)
 def test_a_plate_shows_what_lies_straight_behind_it(pane: Solid) -> None:
     """Each of many small lights: a slab bends light back to where it went."""
     radiance = np.random.default_rng(2).random((16, 32, 3)).astype(np.float32)
-    light, clean = sampler(radiance), surface(CLEAN)
+    light, clean = make_environment_sampler(radiance), surface(CLEAN)
     for degrees in (13.0, -33.0, 52.0):
         camera = facing(degrees)
         way = -np.array(camera.position) / np.linalg.norm(camera.position)
-        seen, mirrored = evaluate(radiance, [way, way * [1, -1, 1]]).astype(np.float64)
+        seen, mirrored = radiance_from_directions(radiance, [way, way * [1, -1, 1]]).astype(
+            np.float64
+        )
         part = slab(abs(degrees))
         found = picture(pane, clean, light, camera, samples=256).radiance.mean(axis=(0, 1))
         np.testing.assert_allclose(found, (1 - part) * seen + part * mirrored, rtol=0.015)
@@ -221,9 +226,11 @@ def test_a_plate_shows_what_lies_straight_behind_it(pane: Solid) -> None:
 def test_what_misses_the_glass_is_the_environment_itself(teapot: Solid) -> None:
     radiance = np.random.default_rng(3).random((16, 32, 3)).astype(np.float32)
     beside = Camera(position=(0.0, -9.0, 5.0), target=(0.0, -9.3, 6.0), height=0.5)
-    found = picture(teapot, surface(WORN), sampler(radiance), beside, size=4, samples=4)
+    found = picture(
+        teapot, surface(WORN), make_environment_sampler(radiance), beside, size=4, samples=4
+    )
     way = np.array([0.0, -0.3, 1.0])
-    expected = np.broadcast_to(evaluate(radiance, way[None])[0], (4, 4, 3))
+    expected = np.broadcast_to(radiance_from_directions(radiance, way[None])[0], (4, 4, 3))
     np.testing.assert_allclose(found.radiance, expected, rtol=1e-6)
     assert found.variance.max() < 1e-12
     assert found.rays == 4 * 4 * 4
@@ -239,7 +246,7 @@ def test_scratched_glass_is_never_brighter_than_even_light(
 ) -> None:
     solid = plate(1.6, 1.2, 0.1) if shape == "plate" else teapot
     camera = orbit((0.0, 0.0, 0.0), 5.0, -60.0, 20.0)
-    light = sampler(uniform(8))
+    light = make_environment_sampler(uniform(8))
     found = picture(solid, surface(WORN, roughness=roughness), light, camera, size=24, samples=32)
     assert 0.1 < found.scratched.max() <= 1.0
     mean, error = block_means(found)
@@ -250,7 +257,7 @@ def test_scratched_glass_is_never_brighter_than_even_light(
 def test_grey_walls_take_light_away(teapot: Solid) -> None:
     """Of what the wall reflects only, F: the rest goes into the glass and stays."""
     camera = orbit((0.0, 0.0, 0.0), 5.0, -60.0, 20.0)
-    light = sampler(uniform(8))
+    light = make_environment_sampler(uniform(8))
     white, black = (
         picture(teapot, surface(WORN, albedo=albedo), light, camera, size=24, samples=32)
         for albedo in (1.0, 0.0)
@@ -307,7 +314,7 @@ def test_light_from_behind_a_matt_plate_is_not_forgotten(pane: Solid) -> None:
     """A small bright light behind it, which chance alone would seldom meet."""
     radiance = np.zeros((32, 64, 3), np.float32)
     radiance[15:17, 15:17] = 400.0  # about azimuth 90
-    light, made = sampler(radiance), surface(EVERYWHERE)
+    light, made = make_environment_sampler(radiance), surface(EVERYWHERE)
     found = picture(pane, made, light, facing(), samples=64)
     chance = picture(pane, made, light, facing(), samples=64, strategy="uniform")
     mean, error = block_means(found)
@@ -349,7 +356,9 @@ def test_the_noise_of_pixels_is_what_their_variance_says(
 def test_importance_and_uniform_sampling_agree(shape: str, roughness: float, teapot: Solid) -> None:
     solid = plate(1.6, 1.2, 0.1) if shape == "plate" else teapot
     camera = orbit((0.0, 0.0, 0.0), 5.0, -60.0, 20.0, view_angle=20.0)
-    light = sampler(sky(32, sun_azimuth=-20.0, sun_elevation=40.0, sun_radius=20.0))
+    light = make_environment_sampler(
+        sky(32, sun_azimuth=-20.0, sun_elevation=40.0, sun_radius=20.0)
+    )
     made = surface(WORN, roughness=roughness)
     one = picture(solid, made, light, camera, samples=128)
     other = picture(solid, made, light, camera, samples=512, strategy="uniform", seed=1)
@@ -439,7 +448,7 @@ def test_the_picture_depends_on_the_seed_alone(
     teapot: Solid, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = orbit((0.0, 0.0, 0.0), 5.0, -60.0, 20.0)
-    light = sampler(sky(16, sun_azimuth=0.0, sun_elevation=40.0, sun_radius=20.0))
+    light = make_environment_sampler(sky(16, sun_azimuth=0.0, sun_elevation=40.0, sun_radius=20.0))
     made = surface(WORN)
 
     def again(seed: int = 5) -> Picture:
@@ -533,4 +542,6 @@ def test_coverage_that_is_no_power_of_two_is_refused() -> None:
 def test_an_environment_is_as_it_was_written_here() -> None:
     """Which half of the map is y > 0: the tests above lean on it."""
     radiance: Radiance = halves(1, 5).radiance
-    np.testing.assert_array_equal(evaluate(radiance, [[0, 1, 0], [0, -1, 0]])[:, 0], [5, 1])
+    np.testing.assert_array_equal(
+        radiance_from_directions(radiance, [[0, 1, 0], [0, -1, 0]])[:, 0], [5, 1]
+    )

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.light.environments import (
-    lamps,
-    rotated,
-    sky,
-    solid_angles,
-    texel_directions,
-    uniform,
-)
+from pipelines.light.built_in_environments import lamps, sky, uniform
+from pipelines.light.environment_maps import rotate_environment, solid_angles, texel_directions
 from pipelines.ssdf_lighting.light.environment_fit import Fit, averaged, blurred, fit_lights
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate, integral
 
@@ -196,7 +190,7 @@ def test_the_scale_of_the_map_is_that_of_the_lights() -> None:
 
 def test_a_rotated_map_is_fitted_as_well() -> None:
     light = lamps(64)
-    one, other = fit_lights(light, 12), fit_lights(rotated(light, 77.0), 12)
+    one, other = fit_lights(light, 12), fit_lights(rotate_environment(light, 77.0), 12)
     assert other.error < 1.3 * one.error
     assert other.irradiance_error < 0.005
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.special import i1e, ndtr
 
-from pipelines.light import environments
+from pipelines.light import environment_maps
 from pipelines.ssdf_lighting.light.spherical_gaussians import (
     Lights,
     VisibleTable,
@@ -111,9 +111,11 @@ def test_products_broadcast() -> None:
 @pytest.mark.parametrize("columns", [1, 24, 100, -17])
 def test_rotated_lights_are_the_rotated_map(columns: int) -> None:
     height, lights = 48, some_lights()
-    ways = environments.texel_directions(height)
+    ways = environment_maps.texel_directions(height)
     degrees = columns * 360.0 / (2 * height)
-    expected = environments.rotated(evaluate(lights, ways).astype(np.float32), degrees)
+    expected = environment_maps.rotate_environment(
+        evaluate(lights, ways).astype(np.float32), degrees
+    )
     np.testing.assert_allclose(evaluate(rotated(lights, degrees), ways), expected, rtol=1e-5)
 
 
