@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.stage import Camera, Shader, Stage, surface, texture
+from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.stage import Camera, Stage, surface, texture
 from pipelines.glass_scratches.tables.scratch_table import Lean
 from pipelines.light.environment_sampling import EnvironmentSampler, sample_directions
 
@@ -22,12 +23,6 @@ if TYPE_CHECKING:
 MOST_LAYERS = 8
 """Two textures of four channels."""
 LIGHTS = 64
-
-_VERTEX = {
-    "Normal::Dec": "in vec3 shading; in vec3 facing; out vec3 shadingOut; flat out vec3 facingOut;"
-    " out vec3 placeOut;",
-    "Normal::Impl": "shadingOut = shading; facingOut = facing; placeOut = vertexMC.xyz;",
-}
 
 
 class ScratchedActor:
@@ -71,7 +66,7 @@ class ScratchedActor:
                 np.float32
             )[None],
         }
-        self._angles = [float(angle) for angle in angles]
+        self._angles = [round(float(angle), 7) for angle in angles]
         self._index, self._tile = index, tile
 
     def actor(self, environment: EnvironmentSampler, camera: Camera) -> Any:
@@ -92,84 +87,20 @@ class ScratchedActor:
             np.arange(len(self._corners)).reshape(-1, 3),
             attributes=self._attributes,
             textures=textures,
-            shader=Shader(_VERTEX, self._fragment(position, through)),
+            shader=surface_shader(
+                "scratched_glass_vertex.glsl",
+                "scratched_glass_fragment.glsl",
+                LAYERS=len(self._angles),
+                ANGLES=self._angles,
+                LIGHTS=LIGHTS,
+                EYE=[round(float(value), 7) for value in position],
+                RELATIVE_INDEX=1.0 / self._index,
+                BASE_REFLECTANCE=((self._index - 1) / (self._index + 1)) ** 2,
+                TILE=float(self._tile),
+                THROUGH=through,
+            ),
             lit=False,
         )
-
-    def _fragment(self, position: NDArray[np.float64], through: float) -> dict[str, str]:
-        count = len(self._angles)
-        angles = ", ".join(f"{angle:.7f}" for angle in self._angles)
-        place = ", ".join(f"{value:.7f}" for value in position)
-        return {
-            "Normal::Dec": f"""
-in vec3 shadingOut; flat in vec3 facingOut; in vec3 placeOut;
-const float PI = 3.14159265;
-const float directions[{count}] = float[{count}]({angles});
-// A macro: the textures are declared further down.
-#define SKY_AT(d) \\
-  textureLod(sky, vec2(0.5 - atan((d).y, (d).x) / (2.0 * PI), 0.5 + asin((d).z) / PI), 0.0).rgb
-float angleOf(vec3 d, vec3 across, vec3 up) {{
-  return atan(dot(d, across), max(dot(d, up), 0.0)) / PI + 0.5;
-}}
-""",
-            "Color::Impl": f"""//VTK::Color::Impl
-  vec3 view = normalize(vec3({place}) - placeOut);
-  vec3 normal = normalize(shadingOut);
-  if (dot(normal, view) * dot(facingOut, view) < 0.0) normal = facingOut;
-  float side = dot(normal, view) > 0.0 ? 1.0 : -1.0;
-  normal *= side;
-  float cosine = clamp(dot(normal, view), 0.0, 1.0);
-  float base = {((self._index - 1) / (self._index + 1)) ** 2!r};
-  float mirrored = base + (1.0 - base) * pow(1.0 - cosine, 5.0);
-  vec3 bent = refract(-view, normal, {1.0 / self._index!r});
-  vec3 straight = normalize(mix(bent, -view, 0.5));
-  vec3 back = reflect(-view, normal);
-  vec3 seen = mix(SKY_AT(straight), SKY_AT(back), mirrored);
-
-  vec3 share = pow(abs(facingOut), vec3(4.0));
-  share /= share.x + share.y + share.z;
-  vec3 scattered = vec3(0.0);
-  float covered = 0.0, uncovered = 1.0;
-  for (int axis = 0; axis < 3; axis++) {{
-    if (share[axis] < 0.01) continue;
-    int one = (axis + 1) % 3, two = (axis + 2) % 3;
-    float up = facingOut[axis] > 0.0 ? 1.0 : 0.0;
-    vec2 uv = vec2(placeOut[one] / {self._tile!r} + 0.37 * float(axis) + 0.11 * up,
-                   placeOut[two] / {self._tile!r} + 0.61 * float(axis) + 0.23 * up);
-    vec4 here[2] = vec4[2](texture(coverageA, uv), texture(coverageB, uv));
-    for (int layer = 0; layer < {count}; layer++) {{
-      float part = here[layer / 4][layer % 4] * share[axis];
-      if (part < 0.002) continue;
-      vec3 along = vec3(0.0);
-      along[one] = cos(directions[layer]);
-      along[two] = sin(directions[layer]);
-      along = normalize(along - dot(along, normal) * normal);
-      vec3 across = cross(normal, along);
-      float row = angleOf(view, across, normal);
-      vec2 leant = texture(leaning, vec2(row, 0.5)).rg;
-      float theta = asin(clamp(abs(dot(view, along)), 0.0, 1.0));
-      float lean = pow(2.0 * theta / PI, leant.g);
-      float factor = lean + (1.0 - lean) * leant.r;
-      vec3 lit = vec3(0.0);
-      for (int n = 0; n < {LIGHTS}; n++) {{
-        vec3 towards = texelFetch(lights, ivec2(n, 1), 0).xyz;
-        float falling = dot(towards, normal);
-        if (falling <= 0.0) continue;
-        vec3 power = texelFetch(lights, ivec2(n, 0), 0).rgb;
-        float rho = texture(table, vec2(angleOf(towards, across, normal), row)).r;
-        lit += power * rho * falling;
-      }}
-      lit *= 2.0 / (PI * PI) * factor;
-      scattered += part * (lit + (1.0 - factor) * vec3({through!r}));
-      covered += part;
-      uncovered *= 1.0 - part;
-    }}
-  }}
-  if (covered > 0.0) seen = uncovered * seen + (1.0 - uncovered) * scattered / covered;
-  ambientColor = seen;
-  diffuseColor = vec3(0.0);
-""",
-        }
 
 
 def draw(

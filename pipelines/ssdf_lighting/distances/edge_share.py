@@ -5,6 +5,8 @@ coefficients are polynomials in 1 / k. They were fitted to ``visible_integral``:
 most for λ >= 2 and |d| <= pi/2. Beyond, where caps go on, x grows by 0.65 k a radian: off by 0.004
 for λ >= 2.5. In Mesa's software renderer a frame of 16 lights took 180 ms
 with it and uniforms, 600 ms with the table and lights in a texture.
+
+The shader's copy is ``visibleShare`` in pipelines/drawing/shaders/sg_visibility.glsl.
 """
 
 from __future__ import annotations
@@ -33,26 +35,3 @@ def edge_share(distance: ArrayLike, sharpness: ArrayLike) -> NDArray[np.float64]
     squared = x * x
     logit = x * (first + squared * (third + squared * _FIFTH))
     return 1 / (1 + np.exp(-np.clip(logit, -_MOST, _MOST)))
-
-
-def _horner(coefficients: tuple[float, ...], variable: str) -> str:
-    code = repr(coefficients[0])
-    for value in coefficients[1:]:
-        code = f"({code} * {variable} + {value!r})"
-    return code
-
-
-EDGE_SHARE_GLSL = f"""
-float edgeShare(float d, float k) {{  // k = sqrt(1 + sharpness)
-  float size = abs(d), away = min(size, {math.pi / 2!r});
-  float squared = away * away, narrow = 1.0 / k;
-  float sine = away * {_horner((*_SINE, 1.0), "squared")};
-  float x = k * (sine + {_BEYOND!r} * (size - away));
-  squared = x * x;
-  float logit = x * ({_horner(_FIRST, "narrow")}
-    + squared * ({_horner(_THIRD, "narrow")} + squared * {_FIFTH!r}));
-  logit = min(logit, {_MOST!r});
-  return 1.0 / (1.0 + exp(d < 0.0 ? logit : -logit));
-}}
-"""
-"""GLSL of ``edge_share``."""

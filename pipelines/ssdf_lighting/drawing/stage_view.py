@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.drawing.stage import Camera, Shader, Stage, surface, texture
-from pipelines.ssdf_lighting.distances.edge_share import EDGE_SHARE_GLSL, edge_share
+from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.stage import Camera, Stage, surface, texture
+from pipelines.ssdf_lighting.distances.edge_share import edge_share
 from pipelines.ssdf_lighting.drawing.camera_rays import eye
 from pipelines.ssdf_lighting.drawing.numpy_view import DistancesAt
 from pipelines.ssdf_lighting.light.cosine_lobes import CosineLobes
@@ -33,6 +34,7 @@ MOST_LIGHTS = 24
 """Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
 _FINE = 2048
 """Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
+_GLOSS_VALUES = {"LEAST_VIEW": LEAST_VIEW, "GLOSS_COLUMNS": GLOSS_COLUMNS}
 
 
 class LitActor:
@@ -161,7 +163,15 @@ class _Part:
                 **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
             },
             textures=textures,
-            shader=_shader(names, count, has_gloss),
+            shader=surface_shader(
+                "lit_vertex.glsl",
+                "lit_fragment.glsl",
+                LIGHTS=count,
+                EDGES=len(names),
+                MATT_HALF=_FINE / 2,
+                GLOSS=has_gloss,
+                **(_GLOSS_VALUES if has_gloss else {}),
+            ),
             lit=False,
         )
         self._arrays, self._edges = _arrays_of(self.actor, names)
@@ -184,9 +194,8 @@ class _Part:
     def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         rows = np.column_stack([lights.axes, lights.sharpness])
         self._uniforms.SetUniform4f("eye", seen_from.tolist())
-        for number, (row, colour) in enumerate(zip(rows, lights.amplitudes, strict=True)):
-            self._uniforms.SetUniform4f(f"towards{number}", row.tolist())
-            self._uniforms.SetUniform3f(f"colour{number}", colour.tolist())
+        for name, values in (("lights", rows), ("amplitudes", lights.amplitudes)):
+            self._uniforms.SetUniform1fv(name, values.size, values.ravel().tolist())
 
 
 def draw_lit(
@@ -258,112 +267,3 @@ def _arrays_of(actor: Any, names: list[str]) -> tuple[list[Any], list[NDArray[np
     points = actor.GetMapper().GetInput().GetPointData()
     arrays = [points.GetArray(name) for name in names]
     return arrays, [vtk_to_numpy(array) for array in arrays]
-
-
-# ---- the shader --------------------------------------------------------------------------------
-
-
-def _shader(names: list[str], count: int, has_gloss: bool) -> Shader:
-    declared = "".join(f" in vec4 {name}; out vec4 {name}Out;" for name in names)
-    passed = "".join(f" {name}Out = {name};" for name in names)
-    return Shader(
-        vertex={
-            "Normal::Dec": "in vec3 shading; in float object; out vec3 shadingOut;"
-            f" out vec3 placeOut; flat out float objectOut;{declared}",
-            "Normal::Impl": "shadingOut = shading; placeOut = vertexMC.xyz; objectOut = object;"
-            + passed,
-        },
-        fragment={
-            "Normal::Dec": "in vec3 shadingOut; in vec3 placeOut; flat in float objectOut;"
-            + "".join(f" in vec4 {name}Out;" for name in names)
-            + EDGE_SHARE_GLSL
-            + (_GLOSS_FUNCTIONS if has_gloss else ""),
-            "Color::Impl": _fragment(names, count, has_gloss),
-        },
-    )
-
-
-def _fragment(names: list[str], count: int, has_gloss: bool) -> str:
-    # Written out light by light: edges and lights at known places are read much faster.
-    return f"""//VTK::Color::Impl
-  vec3 normal = normalize(shadingOut);
-  int row = int(objectOut + 0.5);
-  vec4 look = texelFetch(materials, ivec2(row, 0), 0);
-  vec3 lit = vec3(0.0), lobe;
-{"".join(_matt(number) for number in range(count))}
-  lit *= look.rgb;
-{_gloss(count) if has_gloss else ""}
-  ambientColor = lit;
-  diffuseColor = vec3(0.0);
-"""
-
-
-def _matt(number: int) -> str:
-    return f"""
-  lobe = texelFetch(matt, ivec2(dot(normal, towards{number}.xyz) * {_FINE / 2}
-    + {(_FINE + 1) / 2}, {number}), 0).rgb;
-  lit += colour{number} * (lobe.x
-    * min(edgeShare(edge{number // 4}Out[{number % 4}], lobe.y) * lobe.z, 1.0));"""
-
-
-_GLOSS_FUNCTIONS = """
-float smith(float cosine, float roughness) {
-  float level = sqrt(max(1.0 - cosine * cosine, 1e-12));
-  float a = min(max(cosine, 0.0) / (roughness * level), 1.6);
-  return min((3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a), 1.0);
-}
-float fresnel(float cosine, float index) {
-  float c = clamp(cosine, 1e-6, 1.0);
-  float g = sqrt(index * index - 1.0 + c * c);
-  float across = (g - c) / (g + c), along = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
-  return 0.5 * across * across * (1.0 + along * along);
-}
-// One light's gloss of an amplitude of 1. lobe: kappa, (along, up), ln(amplitude).
-float gleam(vec4 light, float d, vec3 normal, vec3 view, vec3 towards, vec4 lobe,
-            float roughness, float index, float constant) {
-  vec3 joined = lobe.x * towards + light.w * light.xyz;
-  float sharp = length(joined);
-  vec3 axis = joined / sharp;
-  float height = dot(axis, normal);
-  vec3 halfway = normalize(axis + view);
-  float squared = dot(halfway, normal);
-  squared = max(squared * squared, 1e-12);
-  float rest = constant * smith(height, roughness) * fresnel(dot(halfway, view), index)
-    / (squared * squared);
-  float truth = max(
-    log(max(rest, 1e-30)) + (1.0 - 1.0 / squared) / (roughness * roughness), -69.0);
-  vec3 apart = towards - light.xyz, off = axis - towards;
-  float lost = lobe.x * light.w * dot(apart, apart) / (sharp + lobe.x + light.w);
-  float fit = lobe.w - 0.5 * lobe.x * dot(off, off);
-  float narrow = light.w / (light.w + lobe.x);
-  float value = exp(lobe.w - lost + narrow * (truth - fit))
-    * (1.0 - exp(-2.0 * sharp)) * 6.28318531 / sharp;
-  float k = sqrt(1.0 + sharp);
-  float share = edgeShare(d, k) / max(edgeShare(asin(clamp(height, -1.0, 1.0)), k), 1e-3);
-  return height > 0.0 ? value * min(share, 1.0) : 0.0;
-}
-"""
-
-
-def _gloss(count: int) -> str:
-    groups = -(-count // 4)
-    lights = "".join(
-        f"""
-  lit += colour{number} * gleam(towards{number}, edge{groups + number // 4}Out[{number % 4}],
-    normal, view, towards, from, roughness, index, constant);"""
-        for number in range(count)
-    )
-    return f"""
-  vec3 view = normalize(eye.xyz - eye.w * placeOut);
-  float facing = dot(normal, view);
-  float seen = clamp(facing, {LEAST_VIEW!r}, 1.0);
-  float column = seen * {GLOSS_COLUMNS - 1}.0;
-  int left = min(int(column), {GLOSS_COLUMNS - 2});
-  vec4 from = mix(texelFetch(gloss, ivec2(left, row), 0),
-                  texelFetch(gloss, ivec2(left + 1, row), 0), column - float(left));
-  vec3 towards = normalize(from.y * (2.0 * facing * normal - view) + from.z * normal);
-  float roughness = texelFetch(materials, ivec2(row, 1), 0).r;
-  float index = (1.0 + sqrt(look.a)) / (1.0 - sqrt(look.a));
-  float constant = smith(seen, roughness)
-    / (12.56637061 * roughness * roughness * seen);{lights}
-"""
