@@ -20,7 +20,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from assets_defs.street_billboards.compression import RAW_BYTES
 from assets_defs.street_billboards.datasets import (
     billboards_of,
     compressed_of,
@@ -37,7 +36,7 @@ from pipelines.drawing.stage import Stage
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
 from pipelines.street_billboards.capture.depth_refinement import filled
-from pipelines.street_billboards.capture.stereo import bad_share, disparity_defaults, match
+from pipelines.street_billboards.capture.stereo import disparity_defaults, match
 from pipelines.street_billboards.drawing.stage_view import CpuStreet, Street, stage_camera
 from pipelines.street_billboards.textures import eigen_textures as coding
 from pipelines.street_billboards.textures.forms import SEEN, ViewTextures
@@ -113,11 +112,11 @@ def _bytes(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
     return {
         "billboards": count,
         "views": len(views.direction),
-        "raw_bytes_per_billboard": RAW_BYTES,
+        "raw_bytes_per_billboard": figures.RAW_BYTES,
         "bytes_per_billboard": parts["total"] / count,
         "bytes_per_billboard_by_part": {name: value / count for name, value in parts.items()},
         "bytes_of_place_per_billboard": HEADER_BYTES,
-        "bytes_ratio": RAW_BYTES * count / parts["total"],
+        "bytes_ratio": figures.RAW_BYTES * count / parts["total"],
         "observed_bytes_ratio": views.colours.nbytes / parts["total"],
         "decode_rmse_codes": rmse,
         "decode_psnr": psnr,
@@ -163,7 +162,7 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
     for name in ("bc1", "bc7"):
         pictures, size = blocks_coded(name, views.colours, seen)
         apart = pictures[seen].astype(np.float64) - views.colours[seen]
-        rivals[name] = (figures.psnr_of(apart**2), size)
+        rivals[name] = (figures.psnr_of_squared_errors(apart**2), size)
     curve = []
     for error in (3.0, 4.4, 5.0):
         ours = coding.compressed(views, turns, error=error)
@@ -198,16 +197,18 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
 
 def _judged(
     pictures: NDArray[np.uint8], truths: NDArray[np.uint8], where: NDArray[np.bool_]
-) -> list[figures.Likeness]:
-    evened = [figures.evened(*one) for one in zip(pictures, truths, where, strict=True)]
-    return [figures.likeness(*one) for one in zip(evened, truths, where, strict=True)]
+) -> list[figures.ImageMetrics]:
+    evened = [figures.match_exposure(*one) for one in zip(pictures, truths, where, strict=True)]
+    return [figures.image_metrics(*one) for one in zip(evened, truths, where, strict=True)]
 
 
 def _pole_squares(stored: Stored) -> list[NDArray[np.float64]]:
     """Squared errors near the poles' true silhouettes, frame by frame."""
     shown, drive = stored("street_frames"), stored("drive_frames")
     return [
-        figures.squares(picture, truth, figures.near(pole, POLE_PIXELS) & np.isfinite(depth))
+        figures.squared_errors(
+            picture, truth, figures.dilated(pole, POLE_PIXELS) & np.isfinite(depth)
+        )
         for picture, truth, pole, depth in zip(
             shown["rendered"].values,
             shown["truth"].values,
@@ -264,13 +265,13 @@ def _plain(folder: Path, stored: Stored, found: dict[str, Any]) -> dict[str, Any
     launch(folder, {"sampling": "plain"}, None)
     aware, plain = found["_pole"], _pole_squares(stored)
     gains = [
-        figures.psnr_of(mine) - figures.psnr_of(theirs)
+        figures.psnr_of_squared_errors(mine) - figures.psnr_of_squared_errors(theirs)
         for mine, theirs in zip(aware, plain, strict=True)
         if len(mine)
     ]
     return {
-        "occlusion_gain_db": figures.psnr_of(np.concatenate(aware))
-        - figures.psnr_of(np.concatenate(plain)),
+        "occlusion_gain_db": figures.psnr_of_squared_errors(np.concatenate(aware))
+        - figures.psnr_of_squared_errors(np.concatenate(plain)),
         "occlusion_gain_db_by_frame": gains,
         "plain_held_out_psnr": float(stored("street_frames")["psnr"].mean()),
     }
@@ -326,7 +327,8 @@ def _stereo(_: Stored, __: dict[str, Any]) -> dict[str, Any]:
     plain = disparity_defaults(pair.left, pair.right, pair.most)
     dense = filled(found.disparity, pair.left)
     return {
-        "stereo_bad05_percent": 100 * bad_share(dense, pair.disparity),
-        "stereo_bad05_percent_with_holes": 100 * bad_share(found.disparity, pair.disparity),
-        "stereo_bad05_percent_opencv": 100 * bad_share(plain, pair.disparity),
+        "stereo_bad05_percent": 100 * figures.bad_pixel_share(dense, pair.disparity),
+        "stereo_bad05_percent_with_holes": 100
+        * figures.bad_pixel_share(found.disparity, pair.disparity),
+        "stereo_bad05_percent_opencv": 100 * figures.bad_pixel_share(plain, pair.disparity),
     }

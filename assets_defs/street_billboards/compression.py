@@ -20,6 +20,7 @@ from assets_defs.street_billboards.datasets import (
 )
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.system import Metadata
+from pipelines.street_billboards.figures import RAW_BYTES
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     Pictures = dict[str, NDArray[np.uint8]]
     Result = tuple[xr.Dataset, Metadata]
 
-RAW_BYTES = 98_304
-"""Of a billboard: 32 views of 32 x 32 pixels of 3 bytes."""
 _LEAST_BYTES = 136
 """A billboard has a mask, a mean colour and a direction at least."""
 _LEAST_WIDTH = 5.0

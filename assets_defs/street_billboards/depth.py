@@ -56,18 +56,19 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
 def _stereo_bad(checked: StoredVersion) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
     from pipelines.street_billboards.capture.depth_refinement import filled
-    from pipelines.street_billboards.capture.stereo import bad_share, match
+    from pipelines.street_billboards.capture.stereo import match
+    from pipelines.street_billboards.figures import bad_pixel_share
     from storage.readers.street_photographs import motorcycle
 
     pair = motorcycle()
     found, _ = match(pair.left, pair.right, pair.most)
-    return bad_share(filled(found.disparity, pair.left), pair.disparity)
+    return bad_pixel_share(filled(found.disparity, pair.left), pair.disparity)
 
 
 def _depth_error(checked: StoredVersion) -> float | None:
     """Against the true depth of held-out frames, which are matched for this alone."""
     from pipelines.street_billboards.capture.stereo import depth_maps
-    from pipelines.street_billboards.capture.stereo_figures import depth_error
+    from pipelines.street_billboards.figures import depth_error
 
     drive = checked.input("drive_frames")
     if "truth_depth" not in drive:
@@ -212,7 +213,7 @@ def _points_a_metre(checked: StoredVersion) -> float:
 
 def _stray_share(checked: StoredVersion) -> float | None:
     """Against the true depth of held-out frames: a point before it hangs in the air."""
-    from pipelines.street_billboards.capture.stereo_figures import stray_share
+    from pipelines.street_billboards.figures import stray_share
 
     drive = checked.input("drive_frames")
     if "truth_depth" not in drive:

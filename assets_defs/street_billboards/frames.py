@@ -178,10 +178,10 @@ def street_frames(
     seen = [view.covered > 0.5 for view in views]
     shown = [to_8bit(view.with_sky) for view in views]
     rendered = [
-        figures.evened(picture, true, where)
+        figures.match_exposure(picture, true, where)
         for picture, true, where in zip(shown, truth, seen, strict=False)
     ]
-    likeness = [figures.likeness(*one) for one in zip(rendered, truth, seen, strict=False)]
+    likeness = [figures.image_metrics(*one) for one in zip(rendered, truth, seen, strict=False)]
     shaded, decoded = frames.compared(
         made, pages_of(texture_atlases), compressed_of(eigen_textures), intrinsics, held[0], size
     )

@@ -95,13 +95,6 @@ def disparity_defaults(left: Photograph, right: Photograph, most: int) -> Map:
     return _pixels(found, 1)
 
 
-def bad_share(disparity: Map, truth: Map, threshold: float = 0.5) -> float:
-    """Share of the pixels of finite truth that are missing or off by more than ``threshold``."""
-    known = np.isfinite(truth)
-    right = np.abs(disparity[known] - truth[known]) <= threshold
-    return float(1 - right.mean())
-
-
 def _rounded(most: int) -> int:
     return -(-most // _SIXTEENTHS) * _SIXTEENTHS
 

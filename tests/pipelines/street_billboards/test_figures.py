@@ -1,4 +1,4 @@
-"""Figures of pictures and of depth: closed forms and brute force."""
+"""Figures of drives, depth, billboards and pictures: closed forms and brute force."""
 
 from __future__ import annotations
 
@@ -11,8 +11,27 @@ from hypothesis import strategies as st
 
 from pipelines.drawing.colour import encode_srgb
 from pipelines.geometry.cameras import points_at
-from pipelines.street_billboards.capture.stereo_figures import depth_error, stray_share
-from pipelines.street_billboards.figures import evened, likeness, near, psnr, psnr_of, squares
+from pipelines.street_billboards.figures import (
+    bad_pixel_share,
+    depth_error,
+    differing_share,
+    dilated,
+    excess_rank,
+    exposure_spread,
+    frame_spacing,
+    image_metrics,
+    largest_log_gain,
+    match_exposure,
+    mean_psnr,
+    neighbour_difference,
+    off_plane,
+    path_length,
+    psnr,
+    psnr_of_squared_errors,
+    share_in_voxels,
+    squared_errors,
+    stray_share,
+)
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 ALL = np.ones((24, 30), bool)
@@ -44,63 +63,155 @@ def test_squares_may_be_pooled() -> None:
     truth, picture = noise(1), noise(2)
     left = ALL.copy()
     left[:, 11:] = False
-    parts = [squares(picture, truth, left), squares(picture, truth, ~left)]
-    assert psnr_of(np.concatenate(parts)) == pytest.approx(psnr(picture, truth, ALL))
+    parts = [squared_errors(picture, truth, left), squared_errors(picture, truth, ~left)]
+    assert psnr_of_squared_errors(np.concatenate(parts)) == pytest.approx(psnr(picture, truth, ALL))
 
 
 def test_equal_pictures_are_alike() -> None:
-    found = likeness(noise(), noise(), ALL)
+    found = image_metrics(noise(), noise(), ALL)
     assert found.psnr > 100
     assert found.ssim == pytest.approx(1.0)
     assert found.flip == pytest.approx(0.0, abs=1e-6)
 
 
-def test_likeness_sees_only_the_asked_half() -> None:
+def test_image_metrics_see_only_the_asked_half() -> None:
     truth = noise()
     picture = truth.copy()
     picture[:, :8] = 255 - picture[:, :8]
     right = ALL.copy()
     right[:, :23] = False  # FLIP's and SSIM's windows are smaller than the gap
-    spoilt = likeness(picture, truth, ~right)
-    assert likeness(picture, truth, right).ssim == pytest.approx(1.0)
-    assert likeness(picture, truth, right).psnr > 100
+    spoilt = image_metrics(picture, truth, ~right)
+    assert image_metrics(picture, truth, right).ssim == pytest.approx(1.0)
+    assert image_metrics(picture, truth, right).psnr > 100
     assert spoilt.ssim < 0.9
     assert spoilt.flip > 0.05
 
 
 @given(gains=st.tuples(*[st.floats(0.3, 1.0)] * 3), seed=st.integers(0, 100))
-def test_evened_takes_back_a_gain(gains: tuple[float, float, float], seed: int) -> None:
+def test_match_exposure_takes_back_a_gain(gains: tuple[float, float, float], seed: int) -> None:
     light = np.random.default_rng(seed).uniform(0.05, 0.9, (24, 30, 3))
     truth = np.rint(encode_srgb(light) * 255).astype(np.uint8)
     picture = np.rint(encode_srgb(light * gains) * 255).astype(np.uint8)
-    found = evened(picture, truth, ALL)
+    found = match_exposure(picture, truth, ALL)
     # A code of the darker picture stands for up to this many of the brighter one.
     most = max(gain ** (-1 / 2.4) for gain in gains) / 2 + 1.5
     assert np.abs(found.astype(int) - truth).max() <= most
-    np.testing.assert_array_equal(evened(truth, truth, ALL), truth)
+    np.testing.assert_array_equal(match_exposure(truth, truth, ALL), truth)
 
 
-def test_evened_is_not_misled_by_what_is_not_asked() -> None:
+def test_match_exposure_is_not_misled_by_what_is_not_asked() -> None:
     truth = noise()
     picture = truth.copy()
     where = ALL.copy()
     where[:5] = False
     picture[:5] = 0
-    np.testing.assert_array_equal(evened(picture, truth, where)[5:], truth[5:])
+    np.testing.assert_array_equal(match_exposure(picture, truth, where)[5:], truth[5:])
 
 
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 1000), share=st.floats(0.0, 0.1), pixels=st.integers(0, 8))
-def test_near_by_brute_force(seed: int, share: float, pixels: int) -> None:
+def test_dilated_by_brute_force(seed: int, share: float, pixels: int) -> None:
     mask = np.random.default_rng(seed).random((15, 18)) < share
     y, x = np.mgrid[:15, :18]
     expected = np.zeros_like(mask)
     for row, column in np.argwhere(mask):
         expected |= (y - row) ** 2 + (x - column) ** 2 <= pixels**2
-    np.testing.assert_array_equal(near(mask, pixels), expected)
+    np.testing.assert_array_equal(dilated(mask, pixels), expected)
+
+
+def test_mean_psnr_is_of_pictures_not_of_pixels() -> None:
+    truths = np.stack([noise(1), noise(2)])
+    pictures = truths + np.array([3, 12], np.uint8)[:, None, None, None]
+    where = np.stack([ALL, ALL])
+    where[0, 1:] = False
+    expected = (20 * math.log10(255 / 3) + 20 * math.log10(255 / 12)) / 2
+    assert mean_psnr(pictures, truths, where) == pytest.approx(expected)
+
+
+def test_pixels_differ_by_their_worst_channel() -> None:
+    picture = noise()
+    other = picture.copy()
+    other[:12] += np.uint8(1)
+    other[:6, :, 1] += np.uint8(1)
+    assert differing_share(picture, other) == differing_share(other, picture) == 6 / 24
+    assert differing_share(picture, other, most=0) == 12 / 24
+    assert differing_share(picture, other, most=2) == 0.0
+
+
+# ---- drives ----------------------------------------------------------------------------------
+
+
+def test_a_way_is_as_long_as_its_steps() -> None:
+    places = np.array([[0.0, 0, 0], [3, 4, 0], [3, 4, 2], [3, 4, 0]])
+    assert path_length(places) == 9.0
+    assert frame_spacing(places) == 2.0
+
+
+def test_exposures_differ_relative_to_their_mean() -> None:
+    means = np.array([[90.0, 110.0], [90.0, 110.0]])
+    assert exposure_spread(means) == pytest.approx(0.1)
+    assert exposure_spread(3 * means) == pytest.approx(0.1)
+    assert exposure_spread(np.full(4, 90.0)) == 0.0
+
+
+def test_detail_is_looked_for_along_rows() -> None:
+    stripes = np.tile(np.array([0.0, 7.0]), (2, 5, 4))
+    assert neighbour_difference(stripes) == 7.0
+    assert neighbour_difference(stripes.swapaxes(1, 2)) == 0.0
+
+
+def test_gains_count_either_way() -> None:
+    assert largest_log_gain(np.array([[1.0, 1.1], [0.5, 1.2]])) == pytest.approx(math.log(2))
+
+
+# ---- billboards ------------------------------------------------------------------------------
+
+
+def test_points_in_voxels_by_brute_force() -> None:
+    rng = np.random.default_rng(0)
+    voxels = rng.integers(-3, 4, (30, 3)) * 0.5
+    points = rng.uniform(-2, 2, (200, 3))
+    inside = (np.abs(points[:, None] - voxels) <= 0.25).all(axis=2).any(axis=1)
+    assert 0 < inside.mean() < 1
+    assert share_in_voxels(points, voxels, 0.5) == inside.mean()
+
+
+def test_points_are_off_the_plane_of_their_own_voxel() -> None:
+    rng = np.random.default_rng(1)
+    voxels = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    normal = np.array([[0.0, 0, 3.0], [0, 2.0, 0], [1, 0, 0]], np.float32)
+    centre = voxels + np.array([0, 0.1, 0.1])
+    turns = np.array([False, False, True])
+    flat = rng.uniform(-0.4, 0.4, (40, 3)) * [1, 1, 0] + centre[0] + [0, -0.1, 0.2]
+    steep = rng.uniform(-0.4, 0.4, (41, 3)) * [1, 0, 1] + centre[1] - [0, 0.05, 0.1]
+    turning = rng.uniform(-0.4, 0.4, (300, 3)) + voxels[2]
+    outside = rng.uniform(-0.4, 0.4, (300, 3)) + np.array([0, 7, 7])
+    points = np.concatenate([flat, steep, turning, outside])
+
+    def found(points: np.ndarray) -> float:
+        return off_plane(points, voxels, 1.0, centre=centre, normal=normal, turns=turns)
+
+    assert found(flat) == pytest.approx(0.2)
+    assert found(points) == pytest.approx(0.05)
+    assert off_plane(points, voxels, 1.0, centre=centre, normal=normal, turns=~turns | True) == 0.0
+
+
+def test_eigen_images_beyond_the_views() -> None:
+    first = np.array([0, 2, 2, 5])
+    fitting = np.array([[2, 1, 0], [0, 0, 0], [3, 3, 1]], np.uint8)
+    assert excess_rank(fitting, first) == 0
+    fitting[1, 2] = 4
+    assert excess_rank(fitting, first) == 4
 
 
 # ---- depth -----------------------------------------------------------------------------------
+
+
+def test_missing_disparities_are_bad_and_unknown_truth_does_not_count() -> None:
+    truth = np.array([[1, 2, np.nan, 4]], np.float32)
+    found = np.array([[1.4, np.nan, 3, 5]], np.float32)
+    assert bad_pixel_share(found, truth) == pytest.approx(2 / 3)
+    assert bad_pixel_share(found, truth, threshold=1) == pytest.approx(1 / 3)
 
 
 def test_depth_error_by_hand() -> None:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pipelines.street_billboards.capture.depth_refinement import filled
 from pipelines.street_billboards.capture.stereo import (
     DepthMaps,
-    bad_share,
     depth_maps,
     disparity_defaults,
     match,
 )
+from pipelines.street_billboards.figures import bad_pixel_share
 from tests.pipelines.street_billboards.stereo_street import Frame, frame_at
 
 Pair = tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.float32]]
@@ -40,11 +40,11 @@ def _relative_error(maps: DepthMaps, frame: Frame) -> NDArray[np.float32]:
 def test_a_real_pair_is_matched_better_than_by_opencv_as_it_comes(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
     found, _ = match(left, right, 64)
-    defaults = bad_share(disparity_defaults(left, right, 64), truth)
-    assert bad_share(found.disparity, truth) < 0.65 * defaults
-    assert bad_share(filled(found.disparity, left), truth) < 0.45 * defaults
+    defaults = bad_pixel_share(disparity_defaults(left, right, 64), truth)
+    assert bad_pixel_share(found.disparity, truth) < 0.65 * defaults
+    assert bad_pixel_share(filled(found.disparity, left), truth) < 0.45 * defaults
     known = np.isfinite(found.disparity)
-    assert bad_share(found.disparity, np.where(known, truth, np.nan)) < 0.1
+    assert bad_pixel_share(found.disparity, np.where(known, truth, np.nan)) < 0.1
     assert ((found.confidence > 0) == known).all()
     assert found.disparity.dtype == found.confidence.dtype == np.float32
 
@@ -52,7 +52,11 @@ def test_a_real_pair_is_matched_better_than_by_opencv_as_it_comes(motorcycle: Pa
 def test_half_the_width_is_coarser_and_not_bad(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
     fine, coarse = (match(left, right, 64, fine=way)[0].disparity for way in (True, False))
-    assert bad_share(filled(fine, left), truth) < bad_share(filled(coarse, left), truth) < 0.2
+    assert (
+        bad_pixel_share(filled(fine, left), truth)
+        < bad_pixel_share(filled(coarse, left), truth)
+        < 0.2
+    )
 
 
 def test_the_right_photograph_has_disparities_of_its_own(motorcycle: Pair) -> None:
@@ -68,7 +72,7 @@ def test_photographs_of_one_pair_may_be_exposed_differently(motorcycle: Pair) ->
     left, right, truth = motorcycle
     darker = np.rint(right * 0.87).astype(np.uint8)
     same, other = (match(left, one, 64)[0].disparity for one in (right, darker))
-    assert bad_share(other, truth) < bad_share(same, truth) + 0.01
+    assert bad_pixel_share(other, truth) < bad_pixel_share(same, truth) + 0.01
 
 
 def test_a_shift_by_a_fraction_of_a_pixel_is_found() -> None:
@@ -92,13 +96,6 @@ def test_nothing_to_match_has_no_disparity_or_is_flat() -> None:
     right = np.random.default_rng(2).integers(0, 255, (60, 90, 3)).astype(np.uint8)
     found, _ = match(left, right, 32)
     assert np.isfinite(found.disparity).mean() < 0.3
-
-
-def test_missing_disparities_are_bad_and_unknown_truth_does_not_count() -> None:
-    truth = np.array([[1, 2, np.nan, 4]], np.float32)
-    found = np.array([[1.4, np.nan, 3, 5]], np.float32)
-    assert bad_share(found, truth) == pytest.approx(2 / 3)
-    assert bad_share(found, truth, threshold=1) == pytest.approx(1 / 3)
 
 
 def test_holes_take_the_far_side() -> None:
