@@ -13,7 +13,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -21,35 +20,23 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from assets_defs.ssdf_lighting.compression import (
-    distance_blocks,
-    shared_basis_of,
-)
+from assets_defs.ssdf_lighting.datasets import distance_blocks, shared_basis_of, visible_of
 from assets_defs.ssdf_lighting.graph import SSDF
-from assets_defs.ssdf_lighting.meshes import scene_of
-from assets_defs.ssdf_lighting.visibility import unpacked
 from assets_defs.workspace import CHECKOUT, Workspace
+from benchmarks.ssdf_distances import edge_figures, slit_figures
 from benchmarks.ssdf_precompute import SCENE
 from pipelines.ssdf_lighting.compression import compact as coding
-from pipelines.ssdf_lighting.compression.clustered_pca import (
-    ClusteredPca,
-    clustered_pca,
-    decoder_of_pca,
-)
+from pipelines.ssdf_lighting.compression.clustered_pca import ClusteredPca, clustered_pca
 from pipelines.ssdf_lighting.compression.compact_file import to_bytes
-from pipelines.ssdf_lighting.compression.compact_memory import packed
-from pipelines.ssdf_lighting.compression.decoding import decoded_rows, decoder_of
+from pipelines.ssdf_lighting.compression.compact_memory import pack
+from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.triangle_clusters import (
     clusters_by_distance,
     clusters_by_position,
 )
-from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.distances.refined import refined_distances
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
-from pipelines.ssdf_lighting.distances.visibility import RayOrigins, visible_directions
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
-from pipelines.ssdf_lighting.figures import compression_error
-from pipelines.ssdf_lighting.light.spherical_gaussians import integral, visible_integral
+from pipelines.ssdf_lighting.figures import compression_errors
 
 PAPER_CLUSTERS, PAPER_VALUES, PAPER_CONTRIBUTION = 64, 48, 0.9
 PAPER_ERRORS = {"error_48": 0.312758, "error_90": 1.4008}
@@ -60,7 +47,6 @@ SINGLE_FACTORS = {"default": (1, 4), "paper": (1, 4, 16)}
 CURVE_VALUES = (4, 8, 16, 32, 48, 64, 96)
 CURVE_CLUSTERS = (1, 4, 16, 64, 256)
 CURVE_STEPS = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
-NAIVE_VERTICES, FINE_VERTICES, FINE = 500, 250, 384
 
 
 def run(scale: str) -> dict[str, Any]:
@@ -82,8 +68,8 @@ def run(scale: str) -> dict[str, Any]:
         np.save(Path(folder) / "matrix.npy", matrix)
         _timed(figures, "codecs", lambda: _codecs(Path(folder) / "matrix.npy", figures))
         _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
-        _timed(figures, "edges", lambda: _edges(stored))
-        figures |= _slits()
+        _timed(figures, "edges", lambda: edge_figures(stored))
+        figures |= slit_figures()
         from benchmarks.ssdf_pictures import picture_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))
@@ -150,7 +136,7 @@ def _tables(
     seen = stored("visibility")
     samples = np.concatenate(
         [
-            distances_to_samples(unpacked(seen.isel(vertex=slice(first, first + 1024))))
+            distances_to_samples(visible_of(seen.isel(vertex=slice(first, first + 1024))))
             for first in range(0, len(matrix), 1024)
         ]
     )
@@ -176,8 +162,7 @@ def _tables(
 
 
 def _rmse_of_pca(matrix: NDArray[np.float32], pca: ClusteredPca) -> float:
-    decoder = decoder_of_pca(pca, len(matrix))
-    return _rmse(matrix, lambda rows: decoded_rows(decoder, rows))
+    return _rmse(matrix, Decoder.of_pca(pca, len(matrix)).distances)
 
 
 def _dense(cluster: NDArray[np.integer]) -> NDArray[np.int32]:
@@ -193,28 +178,26 @@ def _compact(
     triangles = mesh["triangles"].values
     target = figures["rmse_48"]
     cluster = _dense(stored("triangle_clusters")["vertex_cluster"].values)
-    best = coding.searched(basis, cluster, target)
-    file, memory = to_bytes(best), packed(best)
-    decoder = decoder_of(memory)
-    from_file = coding.coordinates(best)
+    best = coding.quantise_to_rmse(basis, cluster, target)
+    file, memory = to_bytes(best), pack(best)
+    decoder = Decoder.of_file(file)
+    from_file = coding.decoded_coordinates(best)
     vectors = coding.shared_vectors(best) / root_weights(matrix.shape[1])
     errors = (
         _rmse(matrix, lambda rows: from_file[rows] @ vectors),
-        _rmse(matrix, lambda rows: decoded_rows(decoder, rows)),
+        _rmse(matrix, decoder.distances),
     )
-    error = compression_error(
-        distance_blocks(stored("ssdf_matrix")),
-        lambda rows: decoded_rows(decoder, rows),
-        mesh["normals"].values,
+    errors_in_memory = compression_errors(
+        distance_blocks(stored("ssdf_matrix")), decoder.distances, mesh["normals"].values
     )
     found: dict[str, Any] = {
         "file_bytes": len(file),
         "memory_bytes": memory.nbytes,
-        "runtime_bytes": decoder.table.nbytes + decoder.weights.nbytes,
+        "runtime_bytes": decoder.tables.table.nbytes + decoder.tables.weights.nbytes,
         "best_rmse_file": errors[0],
         "best_rmse_memory": errors[1],
         "best_rmse_ratio": max(errors) / target,
-        "best_wrong_visibility": error.wrong_visibility,
+        "best_wrong_visibility": errors_in_memory.wrong_visibility,
         "best_values": len(best.weights) / len(matrix),
         "file_ratio_48": figures["bytes_48"] / len(file),
     }
@@ -222,9 +205,9 @@ def _compact(
     positions = clusters_by_position(mesh["vertices"].values, triangles, PAPER_CLUSTERS, 0)
     alike = clusters_by_distance(basis.coordinates, triangles, PAPER_CLUSTERS, 0)
     for name, labels in (("64_positions", positions.vertex), ("64_distances", alike.vertex)):
-        one = coding.searched(basis, _dense(labels), target)
+        one = coding.quantise_to_rmse(basis, _dense(labels), target)
         found[f"file_bytes_{name}"] = len(to_bytes(one))
-        found[f"memory_bytes_{name}"] = packed(one).nbytes
+        found[f"memory_bytes_{name}"] = pack(one).nbytes
         found[f"values_{name}"] = len(one.weights) / len(matrix)
     found["file_bytes_8_bit"] = sum(part.size for part in best[1:] if part.ndim)
     import lzma
@@ -261,12 +244,12 @@ def _curve(
                 [values, 4 * (kept * directions + used), (squares / (rows * directions)) ** 0.5]
             )
         alike = _dense(clusters_by_distance(basis.coordinates, triangles, count, 0).vertex)
-        factors = coding.factorise(basis, alike)
+        factors = coding.cluster_factors(basis, alike)
         ours = []
         for step in CURVE_STEPS:
-            made = coding.fit(basis, alike, factors, step)
+            made = coding.quantise(basis, alike, factors, step)
             error = (coding.squared_error(basis, made) / matrix.size) ** 0.5
-            ours.append([step, len(to_bytes(made)), packed(made).nbytes, error])
+            ours.append([step, len(to_bytes(made)), pack(made).nbytes, error])
         curve[str(count)] = {"paper": paper, "ours": ours}
     return {"curve": curve}
 
@@ -302,109 +285,13 @@ def _single(folder: Path, factors: tuple[int, ...]) -> dict[str, Any]:
         compressed = store.open(SSDF.slot("ssdf_basis", {"scene": SCENE}))
         basis = shared_basis_of(made)
         rmse = float(compressed["rmse"])
-        own = coding.searched(basis, _dense(made["vertex_cluster"].values), rmse)
-        one = coding.searched(basis, np.zeros(len(basis.coordinates), np.int32), rmse)
+        own = coding.quantise_to_rmse(basis, _dense(made["vertex_cluster"].values), rmse)
+        one = coding.quantise_to_rmse(basis, np.zeros(len(basis.coordinates), np.int32), rmse)
         count = len(basis.coordinates)
         values = len(one.weights) / count, len(own.weights) / count
         label = f"{factor}x"
         found["single_pca_file_ratio"][label] = len(to_bytes(one)) / len(to_bytes(own))
-        found["single_pca_memory_ratio"][label] = packed(one).nbytes / packed(own).nbytes
+        found["single_pca_memory_ratio"][label] = pack(one).nbytes / pack(own).nbytes
         found["single_pca_multiplies_ratio"][label] = values[0] / values[1]
         found["single_pca_values"][label], found["clusters_values"][label] = values
     return found
-
-
-# ---- distances -------------------------------------------------------------------------------
-
-
-def _edges(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
-    """The edge inside a cell against many more directions; speed against all pairs."""
-    from scipy.spatial import cKDTree
-
-    from pipelines.geometry.rays import build_scene
-
-    scene, seen = scene_of(stored("scene_mesh")), stored("visibility")
-    rays = build_scene(scene.vertices, scene.triangles)
-    random = np.random.default_rng(0)
-    origins = seen["origin"].values
-
-    rows = random.permutation(len(origins))[:NAIVE_VERTICES]
-    visible = unpacked(seen)[rows]
-    halves = np.array_split(np.arange(len(rows)), 2)
-    distances_to_samples(visible[:8])  # compiles
-    start = time.perf_counter()
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda half: distances_to_samples(visible[half]), halves))
-    samples_s = time.perf_counter() - start
-    sealed = seen["sealed"].values
-
-    def refined(of: NDArray[np.int64], visible: NDArray[np.bool_]) -> NDArray[np.float32]:
-        return refined_distances(
-            rays, RayOrigins(origins[of], sealed[of]), scene.normals[of], visible
-        )
-
-    refined(rows[:8], visible[:8])
-    start = time.perf_counter()
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda half: refined(rows[half], visible[half]), halves))
-    refined_s = time.perf_counter() - start
-    start = time.perf_counter()
-    for one in visible:
-        _all_pairs(one)
-    naive_s = time.perf_counter() - start
-
-    fine = random.permutation(np.flatnonzero(~sealed))[:FINE_VERTICES]
-    visible = unpacked(seen)[fine]
-    n = round(visible.shape[1] ** 0.5)
-    ours, coarse = refined(fine, visible), distances_to_samples(visible)
-    directions, weights = texel_directions(n), solid_angles(n) / (4 * np.pi)
-    many = texel_directions(FINE)
-    squares = []
-    for row, vertex in enumerate(fine):
-        some = RayOrigins(origins[vertex : vertex + 1], np.zeros(1, bool))
-        there = visible_directions(rays, some, many)[0]
-        if there.all() or not there.any():
-            continue
-        exact = np.where(
-            visible[row],
-            2 * np.arcsin(cKDTree(many[~there]).query(directions)[0] / 2),
-            -2 * np.arcsin(cKDTree(many[there]).query(directions)[0] / 2),
-        )
-        squares.append([weights @ (one[row] - exact) ** 2 for one in (ours, coarse)])
-    errors = np.sqrt(np.mean(squares, axis=0))
-    medians = np.sqrt(np.median(squares, axis=0))
-    return {
-        "distance_vs_naive": samples_s / naive_s,
-        "refined_vs_naive": refined_s / naive_s,
-        "naive_ms": 1000 * naive_s / len(rows),
-        "subcell_error_ratio": float(errors[0] / errors[1]),
-        "subcell_error": float(errors[0]),
-        "sample_error": float(errors[1]),
-        "subcell_error_ratio_median_vertex": float(medians[0] / medians[1]),
-    }
-
-
-def _slits() -> dict[str, Any]:
-    """What the nearest edge alone gets wrong: a light in the middle of a slit, as shares of it.
-
-    A band of half-width a lets f(a) - f(-a) through, the method f(a). Mean for a evenly up to twice
-    the light's width, 1 / sqrt(sharpness), and the most, at the thinnest.
-    """
-    found: dict[str, Any] = {"slit_error": {}, "slit_error_most": 0.0}
-    for sharpness in (10.0, 100.0, 300.0):
-        half = np.linspace(1e-3, 2.0, 200) / np.sqrt(sharpness)
-        over = visible_integral(-half, sharpness) / integral(sharpness)
-        found["slit_error"][f"{sharpness:g}"] = float(over.mean())
-        found["slit_error_most"] = max(found["slit_error_most"], float(over.max()))
-    return found
-
-
-def _all_pairs(visible: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Distances to samples by one matrix product of all visible and all hidden directions."""
-    directions = texel_directions(round(len(visible) ** 0.5)).astype(np.float32)
-    near = directions[visible] @ directions[~visible].T
-    distances = np.empty(len(visible), np.float32)
-    if near.size:
-        distances[visible] = np.arccos(np.minimum(near.max(axis=1), 1.0))
-        distances[~visible] = -np.arccos(np.minimum(near.max(axis=0), 1.0))
-    return distances

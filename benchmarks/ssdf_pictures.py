@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 import tempfile
 from collections.abc import Callable
@@ -10,17 +11,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from assets_defs.ssdf_lighting.compression import decoder_of_basis
 from PIL import Image
-from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
 
+from assets_defs.ssdf_lighting.datasets import decoder_of, scene_of
 from assets_defs.ssdf_lighting.frames import FrameSettings
 from assets_defs.ssdf_lighting.lights import LightSettings
-from assets_defs.ssdf_lighting.meshes import scene_of
 from assets_defs.workspace import CHECKOUT
 from pipelines.light import built_in_environments
+from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.drawing import frames
 from pipelines.ssdf_lighting.drawing.pictures import error_map
+from pipelines.ssdf_lighting.figures import psnr
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.scene import Scene
 
@@ -44,25 +45,20 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     ).lights
     camera = frames.scene_camera(scene, look.azimuth, look.elevation, SIZE[0] / SIZE[1])
     matrix = stored("ssdf_matrix")["distances"].values
-    decoder = decoder_of_basis(stored("ssdf_basis"), len(matrix))
-
-    def compressed(vertices: Any, axes: Any) -> Any:
-        return distances_along(decoder, vertices, axes)
-
-    def uncompressed(vertices: Any, axes: Any) -> Any:
-        return matrix_along(matrix, vertices, axes)
+    compressed = decoder_of(stored("ssdf_basis")).distances_along
+    uncompressed = functools.partial(matrix_along, matrix)
 
     turns = [360.0 * number / TURNS for number in range(TURNS)]
-    turn = frames.turning(scene, lights, compressed, camera, SIZE, turns)
-    exact = frames.turning(scene, lights, uncompressed, camera, SIZE, turns[::4])
+    turn = frames.draw_turning_light(scene, lights, compressed, camera, SIZE, turns)
+    exact = frames.draw_turning_light(scene, lights, uncompressed, camera, SIZE, turns[::4])
     scale = frames.scene_exposure(turn)
     shown = turn.covered > 0.999
     psnrs = [
-        frames.psnr(frames.exposed(one, scale), frames.exposed(other, scale), shown)
+        psnr(frames.exposed(one, scale), frames.exposed(other, scale), shown)
         for one, other in zip(turn.radiance[::4], exact.radiance, strict=True)
     ]
     drawn = {
-        name: frames.turning(
+        name: frames.draw_turning_light(
             scene, lights, look_up, camera, REFERENCE_SIZE, turns[:1], supersampling=4
         )
         for name, look_up in (("compressed", compressed), ("uncompressed", uncompressed))
@@ -82,11 +78,11 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         "sharpest_light": float(lights.sharpness.max()),
         "relit_psnr_db": min(psnrs),
         "relit_psnr_db_mean": float(np.mean(psnrs)),
-        "reference_psnr_db": frames.psnr(ours, by_mitsuba, inside),
-        "reference_psnr_db_uncompressed": frames.psnr(
+        "reference_psnr_db": psnr(ours, by_mitsuba, inside),
+        "reference_psnr_db_uncompressed": psnr(
             frames.exposed(drawn["uncompressed"].radiance[0], scale), by_mitsuba, inside
         ),
-        "reference_noise_psnr_db": frames.psnr(halves[0], halves[1], inside) + 10 * np.log10(4),
+        "reference_noise_psnr_db": psnr(halves[0], halves[1], inside) + 10 * np.log10(4),
     }
 
 

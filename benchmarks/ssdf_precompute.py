@@ -18,7 +18,7 @@ import dagster as dg
 
 from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, Request
-from assets_defs.ssdf_lighting.compression import ClusterSettings
+from assets_defs.ssdf_lighting.clusters import ClusterSettings
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.ssdf_lighting.meshes import SceneSettings
 from assets_defs.workspace import Workspace

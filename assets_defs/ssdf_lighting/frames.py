@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
-from assets_defs.ssdf_lighting.compression import decoder_of_basis, distance_blocks
+from assets_defs.ssdf_lighting.datasets import (
+    decoder_of,
+    frames_dataset,
+    lights_of,
+    matrix_distances_along,
+    scene_of,
+)
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.ssdf_lighting.lights import lights_of
-from assets_defs.ssdf_lighting.meshes import scene_of
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.ssdf_lighting import figures
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
 
@@ -21,9 +27,6 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 _GAIN = 8.0
 """Of the pictures of differences."""
@@ -65,31 +68,32 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _psnr(checked: StoredVersion, reference: str) -> float:
-    from pipelines.ssdf_lighting.drawing.frames import psnr
-
-    dataset = checked.dataset
-    return psnr(
-        dataset["frames"].values[0], dataset[reference].values, dataset["covered"].values > 0.999
-    )
+def _shows_scene(relit_frames: xr.Dataset) -> NDArray[np.bool_]:
+    """Pixels that the scene covers."""
+    return relit_frames["covered"].values > 0.999
 
 
-def _relit_psnr(checked: StoredVersion) -> float:
-    return _psnr(checked, "uncompressed")
+def _psnr(version: StoredVersion, reference: str) -> float:
+    pictures = version.dataset
+    first, other = pictures["frames"].values[0], pictures[reference].values
+    return figures.psnr(first, other, _shows_scene(pictures))
 
 
-def _reference_psnr(checked: StoredVersion) -> float:
-    return _psnr(checked, "reference")
+def _relit_psnr(version: StoredVersion) -> float:
+    return _psnr(version, "uncompressed")
 
 
-def _mean_brightness(checked: StoredVersion) -> float:
-    dataset = checked.dataset
-    shown = dataset["frames"].values[:, dataset["covered"].values > 0.999]
-    return float(shown.astype("float64").mean() / 255.0)
+def _reference_psnr(version: StoredVersion) -> float:
+    return _psnr(version, "reference")
 
 
-def _coverage(checked: StoredVersion) -> float:
-    return float(checked.dataset["covered"].values.mean())
+def _mean_brightness(version: StoredVersion) -> float:
+    pictures = version.dataset
+    return figures.mean_brightness(pictures["frames"].values, _shows_scene(pictures))
+
+
+def _coverage(version: StoredVersion) -> float:
+    return float(version.dataset["covered"].values.mean())
 
 
 @SSDF.asset(
@@ -133,7 +137,7 @@ def _coverage(checked: StoredVersion) -> float:
 )
 def relit_frames(
     settings: FrameSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     scene_mesh: xr.Dataset,
     ssdf_matrix: xr.Dataset,
     triangle_clusters: xr.Dataset,
@@ -142,77 +146,22 @@ def relit_frames(
 ) -> Result:
     """Draw the scene under the turning light; the first frame also not compressed, and traced."""
     import numpy as np
-    import xarray as xr
 
-    from pipelines.ssdf_lighting.compression.decoding import distances_along, matrix_along
     from pipelines.ssdf_lighting.drawing import frames
 
     scene, lights = scene_of(scene_mesh), lights_of(environment_lights)
     size = (settings.width, settings.width * 3 // 4)
     camera = frames.scene_camera(scene, settings.azimuth, settings.elevation, size[0] / size[1])
-    decoder = decoder_of_basis(ssdf_basis, len(scene.vertices))
     turns = [360.0 * number / settings.frames for number in range(settings.frames)]
-    turn = frames.turning(
-        scene,
-        lights,
-        lambda vertices, axes: distances_along(decoder, vertices, axes),
-        camera,
-        size,
-        turns,
-        lambda fraction: progress(0.3 * fraction),
+    distances = frames.ComparedDistances(
+        decoder_of(ssdf_basis).distances_along, partial(matrix_distances_along, ssdf_matrix)
     )
-    exact = frames.turning(
-        scene,
-        lights,
-        lambda vertices, axes: _along_stored(ssdf_matrix, vertices, axes, matrix_along),
-        camera,
-        size,
-        turns[:1],
+    found = frames.relit_frames(
+        scene, lights, distances, camera, size, turns, settings.reference_samples, progress
     )
-    progress(0.4)
-    reference = frames.traced(
-        scene,
-        lights,
-        camera,
-        size,
-        settings.reference_samples,
-        progress=lambda fraction: progress(0.4 + 0.6 * fraction),
-    )
-    scale = frames.scene_exposure(turn)
-    pixels = ("y", "x", "channel")
-    backdrop = turn.radiance[0] * (reference.radiance[..., 3:] == 0)
-    dataset = xr.Dataset(
-        {
-            "frames": (("frame", *pixels), frames.exposed(turn.radiance, scale)),
-            "turn": (("frame",), np.array(turns)),
-            "exposure": ((), scale),
-            "uncompressed": (pixels, frames.exposed(exact.radiance[0], scale)),
-            "reference": (pixels, frames.exposed(reference.radiance[..., :3] + backdrop, scale)),
-            "clusters": (
-                pixels,
-                frames.cluster_picture(scene, triangle_clusters["cluster"].values, camera, size),
-            ),
-            "covered": (("y", "x"), turn.covered),
-        }
-    )
-    return dataset, {
-        "frames a second": 1.0 / float(np.median(turn.seconds)),
-        "renderer": turn.renderer,
+    clusters = frames.cluster_picture(scene, triangle_clusters["cluster"].values, camera, size)
+    return frames_dataset(found, turns, clusters), {
+        "frames a second": 1.0 / float(np.median(found.turning.seconds)),
+        "renderer": found.turning.renderer,
         "sharpest λ": float(lights.sharpness.max()),
     }
-
-
-def _along_stored(
-    ssdf_matrix: xr.Dataset,
-    vertices: NDArray[np.int64],
-    axes: NDArray[np.float32],
-    look_up: Callable[..., NDArray[np.float32]],
-) -> NDArray[np.float32]:
-    """Distances from the stored matrix, block by block; ``vertices`` are ascending."""
-    import numpy as np
-
-    found = np.empty(axes.shape[:2], np.float32)
-    for rows, block in distance_blocks(ssdf_matrix):
-        inside = np.flatnonzero((vertices >= rows[0]) & (vertices <= rows[-1]))
-        found[inside] = look_up(block, vertices[inside] - rows[0], axes[inside])
-    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
@@ -10,8 +10,9 @@ from pydantic import Field
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
+from assets_defs.ssdf_lighting.datasets import lights_dataset, lights_of
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
 
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
-
-    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 _HEIGHT = 256
 """Rows of the built-in environments."""
@@ -44,29 +40,21 @@ class LightSettings(Settings):
     }
 
 
-def lights_of(environment_lights: xr.Dataset) -> Lights:
-    """The lights of an `environment_lights` dataset."""
-    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
-
-    names = ("axes", "sharpness", "amplitudes")
-    return Lights(*(environment_lights[name].values for name in names))
-
-
-def _flux_error(checked: StoredVersion) -> float:
+def _flux_error(version: StoredVersion) -> float:
     from pipelines.ssdf_lighting.light.environment_fit import flux_error
 
-    return flux_error(lights_of(checked.dataset), checked.dataset["radiance"].values)
+    return flux_error(lights_of(version.dataset), version.dataset["radiance"].values)
 
 
-def _irradiance_error(checked: StoredVersion) -> float:
-    from pipelines.ssdf_lighting.light.environment_fit import judged
+def _irradiance_error(version: StoredVersion) -> float:
+    from pipelines.ssdf_lighting.light.environment_fit import evaluate_fit
 
-    dataset = checked.dataset
-    return judged(lights_of(dataset), dataset["radiance"].values).irradiance_error
+    radiance = version.dataset["radiance"].values
+    return evaluate_fit(lights_of(version.dataset), radiance).irradiance_error
 
 
-def _tone_error(checked: StoredVersion) -> float:
-    return float(checked.dataset["tone_error"])
+def _tone_error(version: StoredVersion) -> float:
+    return float(version.dataset["tone_error"])
 
 
 def _light_pictures(dataset: xr.Dataset) -> Pictures:
@@ -113,48 +101,34 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
         ),
     ),
 )
-def environment_lights(
-    settings: LightSettings, source: Source, progress: Callable[[float], None]
-) -> Result:
+def environment_lights(settings: LightSettings, source: Source, progress: Progress) -> Result:
     """Fit spherical Gaussians to the environment."""
-    import xarray as xr
+    from pipelines.ssdf_lighting.light.environment_fit import downsampled, fit_lights, flux_error
 
-    from pipelines.light import built_in_environments
-    from pipelines.ssdf_lighting.light.environment_fit import averaged, fit_lights, flux_error
-    from storage.readers.environments import read_environment
-
-    if source.path is not None:
-        radiance = read_environment(source.path)
-    elif source.key == "sky":
-        radiance = built_in_environments.sky(
-            _HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
-        )
-    elif source.key == "lamps":
-        radiance = built_in_environments.lamps(_HEIGHT)
-    else:
-        radiance = built_in_environments.uniform(8)
-    small = averaged(radiance, _STORED)
-    found = fit_lights(
+    small = downsampled(_radiance(settings, source), _STORED)
+    fit = fit_lights(
         small,
         settings.lights,
         least_sharpness=settings.least_sharpness,
         most_sharpness=settings.most_sharpness,
         progress=progress,
     )
-    dataset = xr.Dataset(
-        {
-            "radiance": (("row", "column", "channel"), small.astype("float32")),
-            "axes": (("light", "axis"), found.lights.axes),
-            "sharpness": (("light",), found.lights.sharpness),
-            "amplitudes": (("light", "channel"), found.lights.amplitudes),
-            "error": ((), found.error),
-            "tone_error": ((), found.tone_error),
-            "irradiance_error": ((), found.irradiance_error),
-            "flux_error": ((), flux_error(found.lights, small)),
-        },
-        attrs={"name": source.name},
-    )
+    dataset = lights_dataset(small, fit, flux_error(fit.lights, small), source.name)
     return dataset, {
-        "sharpest λ": float(found.lights.sharpness.max()),
-        "irradiance error": found.irradiance_error,
+        "sharpest λ": float(fit.lights.sharpness.max()),
+        "irradiance error": fit.irradiance_error,
     }
+
+
+def _radiance(settings: LightSettings, source: Source) -> NDArray[np.floating]:
+    """The environment (row, column, 3). Raises BadInput for a file that holds none."""
+    from pipelines.light.built_in_environments import lamps, sky, uniform
+    from storage.readers.environments import read_environment
+
+    if source.path is not None:
+        return read_environment(source.path)
+    if source.key == "sky":
+        return sky(_HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation)
+    if source.key == "lamps":
+        return lamps(_HEIGHT)
+    return uniform(8)

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
+from assets_defs.ssdf_lighting.datasets import (
+    ray_origins_of,
+    scene_of,
+    visibility_dataset,
+    visible_of,
+)
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.ssdf_lighting.meshes import scene_of
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.ssdf_lighting import figures
+from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
 
@@ -20,9 +27,6 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 _BLOCK = 256
 """Vertices of a block: 4 MB of distances along 4096 directions."""
@@ -46,42 +50,39 @@ class VisibilitySettings(Settings):
     }
 
 
-def _visibility_error(checked: StoredVersion) -> float:
-    from pipelines.ssdf_lighting.figures import visibility_error
+def check_size(name: str, vertices: int, settings: VisibilitySettings) -> None:
+    """Raises ValueError where the matrix needs more bytes than allowed, and for a number of
+    directions that is no octahedral map's."""
+    resolution_of(settings.directions)
+    needed = vertices * settings.directions * 4
+    if needed > settings.byte_budget:
+        raise ValueError(
+            f"{name}: the SSDFs of {vertices} vertices and {settings.directions} directions need "
+            f"{needed} bytes; expected at most byte_budget, {settings.byte_budget}."
+        )
 
-    scene = scene_of(checked.input("scene_mesh"))
-    dataset = checked.dataset
-    return visibility_error(
-        scene.vertices,
-        scene.triangles,
-        dataset["origin"].values,
-        dataset["sealed"].values,
-        unpacked(dataset),
-        dataset["direction"].values,
+
+def _visibility_error(version: StoredVersion) -> float:
+    mesh, seen = version.input("scene_mesh"), version.dataset
+    return figures.visibility_error(
+        mesh["vertices"].values,
+        mesh["triangles"].values,
+        seen["origin"].values,
+        seen["sealed"].values,
+        visible_of(seen),
+        seen["direction"].values,
     )
 
 
-def _visible_share(checked: StoredVersion) -> float:
-    """Of the sphere, mean of the vertices."""
-    import numpy as np
-
-    dataset = checked.dataset
-    weights = dataset["solid_angle"].values / (4 * np.pi)
-    return float(np.mean(unpacked(dataset) @ weights))
-
-
-def unpacked(visibility: xr.Dataset) -> NDArray[np.bool_]:
-    """Visibility (vertices, directions) of a `visibility` dataset."""
-    import numpy as np
-
-    bits = np.unpackbits(visibility["visible"].values, axis=1)
-    return bits[:, : visibility.sizes["direction"]].astype(bool)
+def _visible_share(version: StoredVersion) -> float:
+    solid_angle = version.dataset["solid_angle"].values
+    return figures.visible_sphere_share(visible_of(version.dataset), solid_angle)
 
 
 def _visibility_pictures(dataset: xr.Dataset) -> Pictures:
     from pipelines.ssdf_lighting.drawing.pictures import sky_picture
 
-    return {"visible-share": sky_picture(unpacked(dataset))}
+    return {"visible-share": sky_picture(visible_of(dataset))}
 
 
 @SSDF.asset(
@@ -107,62 +108,16 @@ def _visibility_pictures(dataset: xr.Dataset) -> Pictures:
         ),
     ),
 )
-def visibility(
-    settings: VisibilitySettings, progress: Callable[[float], None], scene_mesh: xr.Dataset
-) -> Result:
+def visibility(settings: VisibilitySettings, progress: Progress, scene_mesh: xr.Dataset) -> Result:
     """Cast a ray from every vertex in every direction."""
-    import numpy as np
-    import xarray as xr
+    from pipelines.ssdf_lighting.distances.visibility import scene_visibility
 
-    from pipelines.geometry.rays import build_scene
-    from pipelines.ssdf_lighting.distances.octahedral import (
-        resolution_of,
-        solid_angles,
-        texel_directions,
-    )
-    from pipelines.ssdf_lighting.distances.visibility import (
-        RayOrigins,
-        ray_origins,
-        stand_ins,
-        visible_directions,
-    )
-
-    scene = scene_of(scene_mesh)
-    n = resolution_of(settings.directions)
-    rays = build_scene(scene.vertices, scene.triangles)
-    origins = ray_origins(rays, scene.vertices, scene.triangles, scene.normals)
-    bits = np.empty((len(scene.vertices), (n * n + 7) // 8), np.uint8)
-    share = np.empty(len(bits))
-    for first in range(0, len(bits), _BLOCK):
-        block = slice(first, first + _BLOCK)
-        some = RayOrigins(origins.points[block], origins.sealed[block])
-        seen = visible_directions(rays, some, texel_directions(n))
-        bits[block], share[block] = np.packbits(seen, axis=1), seen.mean(axis=1)
-        progress(first / len(bits))
-    # What is stored for a buried vertex is what another one sees: origin and all.
-    stored = stand_ins(
-        rays,
-        scene.vertices,
-        scene.triangles,
-        scene.normals,
-        origins,
-        share,
-        texel_directions(n),
-    )
-    dataset = xr.Dataset(
-        {
-            "visible": (("vertex", "byte"), bits[stored]),
-            "origin": (("vertex", "axis"), origins.points[stored]),
-            "sealed": (("vertex",), origins.sealed[stored]),
-            "stored": (("vertex",), stored.astype(np.int32)),
-            "direction": (("direction", "axis"), texel_directions(n)),
-            "solid_angle": (("direction",), solid_angles(n)),
-        }
-    )
-    return dataset, {
-        "rays": len(bits) * n * n,
-        "sealed vertices": int(origins.sealed.sum()),
-        "buried vertices": int((stored != np.arange(len(stored))).sum()),
+    scene, n = scene_of(scene_mesh), resolution_of(settings.directions)
+    found = scene_visibility(scene.vertices, scene.triangles, scene.normals, n, progress)
+    return visibility_dataset(found, n), {
+        "rays": len(found.stored) * settings.directions,
+        "sealed vertices": found.sealed,
+        "buried vertices": found.buried,
     }
 
 
@@ -179,29 +134,27 @@ class MatrixSettings(Settings):
     )
 
 
-def _distance_error(checked: StoredVersion) -> float:
-    from pipelines.ssdf_lighting.figures import distance_error, sampled_rows
-
-    seen = checked.input("visibility")
-    rows = sampled_rows(seen.sizes["vertex"], 12)
-    return distance_error(
-        checked.dataset["distances"].isel(vertex=rows).values,
-        unpacked(seen.isel(vertex=rows)),
-        refined=checked.record["settings"]["edges"] == "refined",
+def _distance_error(version: StoredVersion) -> float:
+    seen = version.input("visibility")
+    rows = figures.sampled_rows(seen.sizes["vertex"], 12)
+    return figures.distance_error(
+        version.dataset["distances"].isel(vertex=rows).values,
+        visible_of(seen.isel(vertex=rows)),
+        refined=version.record["settings"]["edges"] == "refined",
     )
 
 
-def _sign_error(checked: StoredVersion) -> float:
-    """Share of all distances whose sign is not that of the visibility."""
-    import numpy as np
+def _sign_error(version: StoredVersion) -> float:
+    distances, seen = version.dataset["distances"], version.input("visibility")
+    return figures.sign_error(
+        (distances[block].values, visible_of(seen.isel(vertex=block)))
+        for block in _blocks(len(distances))
+    )
 
-    distances, seen = checked.dataset["distances"], checked.input("visibility")
-    wrong = 0
-    for first in range(0, len(distances), _BLOCK):
-        block = slice(first, first + _BLOCK)
-        signs = distances[block].values > 0
-        wrong += int(np.count_nonzero(signs != unpacked(seen.isel(vertex=block))))
-    return wrong / distances.size
+
+def _blocks(count: int) -> Iterator[slice]:
+    for first in range(0, count, _BLOCK):
+        yield slice(first, min(first + _BLOCK, count))
 
 
 @SSDF.asset(
@@ -227,48 +180,66 @@ def _sign_error(checked: StoredVersion) -> float:
 )
 def ssdf_matrix(
     settings: MatrixSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     scene_mesh: xr.Dataset,
     visibility: xr.Dataset,
 ) -> Result:
     """Measure the distances, block by block, as the store takes them."""
-    import dask
-    import dask.array as da
-    import numpy as np
     import xarray as xr
 
+    count, directions = visibility.sizes["vertex"], visibility.sizes["direction"]
+    measure = _measure(settings, scene_mesh, visibility)
+    distances = _lazy_rows(measure, (count, directions), progress)
+    dataset = xr.Dataset({"distances": (("vertex", "direction"), distances)})
+    return dataset, {"bytes": count * directions * 4}
+
+
+def _measure(
+    settings: MatrixSettings, scene_mesh: xr.Dataset, visibility: xr.Dataset
+) -> Callable[[slice], NDArray[np.float32]]:
+    """A function that measures the distances of a block of vertices."""
     from pipelines.geometry.rays import build_scene
     from pipelines.ssdf_lighting.distances.refined import refined_distances
     from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
     from pipelines.ssdf_lighting.distances.visibility import RayOrigins
 
-    scene = scene_of(scene_mesh)
+    scene, origins = scene_of(scene_mesh), ray_origins_of(visibility)
     rays = build_scene(scene.vertices, scene.triangles)
-    origins, sealed = visibility["origin"].values, visibility["sealed"].values
-    count, directions = len(scene.vertices), visibility.sizes["direction"]
+
+    def distances(block: slice) -> NDArray[np.float32]:
+        seen = visible_of(visibility.isel(vertex=block))
+        if settings.edges == "samples":
+            return distances_to_samples(seen)
+        some = RayOrigins(origins.points[block], origins.sealed[block])
+        return refined_distances(rays, some, scene.normals[block], seen)
+
+    return distances
+
+
+def _lazy_rows(
+    measure: Callable[[slice], NDArray[np.float32]], shape: tuple[int, int], progress: Progress
+) -> object:
+    """A lazy array of float32 whose blocks of rows are measured when they are asked for."""
+    import dask
+    import dask.array as da
+    import numpy as np
+
     done, lock = [0], threading.Lock()
 
-    def block_of(first: int) -> NDArray[np.float32]:
-        block = slice(first, first + _BLOCK)
-        seen = unpacked(visibility.isel(vertex=block))
-        if settings.edges == "samples":
-            distances = distances_to_samples(seen)
-        else:
-            distances = refined_distances(
-                rays, RayOrigins(origins[block], sealed[block]), scene.normals[block], seen
-            )
+    def measured(block: slice) -> NDArray[np.float32]:
+        rows = measure(block)
         with lock:
-            done[0] += len(seen)
-            progress(done[0] / count)
-        return distances
+            done[0] += len(rows)
+            progress(done[0] / shape[0])
+        return rows
 
-    blocks = [
-        da.from_delayed(
-            dask.delayed(block_of, pure=False)(first),
-            (min(_BLOCK, count - first), directions),
-            np.float32,
-        )
-        for first in range(0, count, _BLOCK)
-    ]
-    dataset = xr.Dataset({"distances": (("vertex", "direction"), da.concatenate(blocks))})
-    return dataset, {"bytes": count * directions * 4}
+    return da.concatenate(
+        [
+            da.from_delayed(
+                dask.delayed(measured, pure=False)(block),
+                (block.stop - block.start, shape[1]),
+                np.float32,
+            )
+            for block in _blocks(shape[0])
+        ]
+    )

@@ -1,4 +1,5 @@
-"""Figures of merit of visibility, distances and their compression."""
+"""Figures of merit, as the checks of the graph have them: scenes, visibility, distances, their
+compression, pictures. Functions of arrays; what is large comes in blocks."""
 
 from __future__ import annotations
 
@@ -10,16 +11,18 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.repair import edge_ends
 from pipelines.ssdf_lighting.distances.octahedral import (
+    NO_EDGE,
+    delaunay_sides,
     resolution_of,
     solid_angles,
     texel_directions,
 )
-from pipelines.ssdf_lighting.distances.signed_distance import NO_EDGE
-from pipelines.ssdf_lighting.distances.visible_edge import delaunay_sides
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 
 FloatArray = NDArray[np.float64]
 
 _SAMPLED_RAYS = 256
+_SAMPLED_AXES = 12
 
 
 def sampled_rows(count: int, wanted: int) -> NDArray[np.int64]:
@@ -27,6 +30,44 @@ def sampled_rows(count: int, wanted: int) -> NDArray[np.int64]:
     starts = np.linspace(0, max(count - 16, 0), max(1, wanted // 16)).astype(np.int64)
     rows = np.unique(starts[:, None] + np.arange(16))
     return rows[rows < count]
+
+
+# ---- scenes ------------------------------------------------------------------------------------
+
+
+def turned_away(vertices: FloatArray, triangles: NDArray[np.integer], normals: FloatArray) -> float:
+    """Share of the triangles' corners whose normal looks away from the triangle's front.
+
+    vertices, normals (V, 3); triangles (F, 3).
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> turned_away(corners, np.array([[0, 1, 2]]), np.array([[0.0, 0, 1], [0, 0, 1], [0, 0, 1]]))
+    0.0
+    """
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    facing = np.cross(b - a, c - a)
+    along = np.einsum("fc,fkc->fk", facing, normals[triangles])
+    return float((along < 0).mean())
+
+
+def surface_area(vertices: FloatArray, triangles: NDArray[np.integer]) -> float:
+    """Area of triangles (F, 3), in the square of the unit of vertices (V, 3)."""
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+# ---- visibility and distances ------------------------------------------------------------------
+
+
+def visible_sphere_share(visible: NDArray[np.bool_], solid_angle: FloatArray) -> float:
+    """Share of the sphere that is seen, mean of the vertices of ``visible`` (V, D); ``solid_angle``
+    (D,) in steradians.
+
+    >>> visible_sphere_share(np.array([[True, False], [True, True]]), np.full(2, 2 * np.pi))
+    0.75
+    """
+    weights = solid_angle / (4 * np.pi)
+    return float(np.mean(visible @ weights))
 
 
 def visibility_error(
@@ -106,7 +147,50 @@ def distance_error(
     return float(max(over.max(), under.max(), flipped.max(), 0.0))
 
 
-class Error(NamedTuple):
+def sign_error(
+    blocks: Iterable[tuple[NDArray[np.float32], NDArray[np.bool_]]],
+) -> float:
+    """Share of all distances whose sign is not that of the visibility, of blocks (d, visible)."""
+    wrong, count = 0, 0
+    for distances, visible in blocks:
+        wrong += int(np.count_nonzero((distances > 0) != visible))
+        count += distances.size
+    return wrong / count
+
+
+# ---- compression -------------------------------------------------------------------------------
+
+
+def unused_share(cluster: NDArray[np.integer]) -> float:
+    """Share of the cluster numbers up to the largest that no triangle has; 1 for negative ones.
+
+    >>> unused_share(np.array([0, 3, 3]))
+    0.5
+    """
+    if cluster.min() < 0:
+        return 1.0
+    return float((np.bincount(cluster) == 0).mean())
+
+
+def shared_basis_rmse(
+    distances: NDArray[np.float32],
+    coordinates: NDArray[np.float32],
+    vectors: NDArray[np.float32],
+) -> float:
+    """Error, radians weighted by solid angle, of the shared basis on vertices with ``distances``
+    (P, D) and ``coordinates`` (P, R) in ``vectors`` (D, R)."""
+    weighted = distances * root_weights(distances.shape[1])
+    found = coordinates @ vectors.T
+    return float(np.sqrt(((weighted - found).astype(np.float64) ** 2).mean()))
+
+
+def weighted_rmse(found: NDArray[np.float32], true: NDArray[np.float32]) -> float:
+    """RMSE of distances (P, D), radians weighted by solid angle."""
+    weighted = (found - true) * root_weights(true.shape[1])
+    return float(np.sqrt((weighted.astype(np.float64) ** 2).mean()))
+
+
+class CompressionErrors(NamedTuple):
     """``rmse`` radians, weighted by solid angle; ``wrong_visibility``, the share of the directions
     above the vertices' tangent planes, by solid angle, in which the sign is wrong;
     ``vertex_rmse`` (V,) float32."""
@@ -116,11 +200,11 @@ class Error(NamedTuple):
     vertex_rmse: NDArray[np.float32]
 
 
-def compression_error(
+def compression_errors(
     blocks: Iterable[tuple[NDArray[np.int64], NDArray[np.float32]]],
     decode: Callable[[NDArray[np.int64]], NDArray[np.float32]],
     normals: FloatArray,
-) -> Error:
+) -> CompressionErrors:
     """Compare what ``decode`` makes of vertex numbers with (numbers, distances) blocks."""
     squares, wrong, above = [], 0.0, 0.0
     for vertices, distances in blocks:
@@ -132,7 +216,30 @@ def compression_error(
         wrong += float((upper * ((found > 0) != (distances > 0))).sum())
         above += float(upper.sum())
     each = np.concatenate(squares)
-    return Error(float(np.sqrt(each.mean())), wrong / above, np.sqrt(each).astype(np.float32))
+    return CompressionErrors(
+        float(np.sqrt(each.mean())), wrong / above, np.sqrt(each).astype(np.float32)
+    )
+
+
+def errors_along_axes(
+    blocks: Iterable[tuple[NDArray[np.int64], NDArray[np.float32]]],
+    distances_along: Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]],
+) -> NDArray[np.float32]:
+    """Found minus true d (V, 12), radians, along random axes, the same for all vertices.
+
+    blocks: vertex numbers and distances (n, D), in order; distances_along: of vertices (n,) along
+    unit vectors (n, 12, 3), d (n, 12).
+    """
+    from pipelines.ssdf_lighting.compression.lookup import matrix_along
+
+    axes = np.random.default_rng(0).normal(size=(1, _SAMPLED_AXES, 3)).astype(np.float32)
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    errors = []
+    for vertices, distances in blocks:
+        along = np.repeat(axes, len(vertices), axis=0)
+        true = matrix_along(distances, np.arange(len(vertices)), along)
+        errors.append(distances_along(vertices, along) - true)
+    return np.concatenate(errors)
 
 
 def border_step(
@@ -151,3 +258,24 @@ def border_step(
         return 1.0
     steps = ((errors[edges[:, 0]] - errors[edges[:, 1]]).astype(np.float64) ** 2).mean(axis=1)
     return float(np.sqrt(steps[between].mean() / max(steps[~between].mean(), 1e-300)))
+
+
+# ---- pictures ----------------------------------------------------------------------------------
+
+
+def psnr(
+    picture: NDArray[np.uint8], reference: NDArray[np.uint8], shown: NDArray[np.bool_]
+) -> float:
+    """Peak signal to noise ratio (dB) of 8-bit pictures (H, W, 3) over the pixels ``shown`` (H, W).
+
+    >>> grey = np.full((4, 4, 3), 100, np.uint8)
+    >>> round(psnr(grey + np.uint8(5), grey, np.ones((4, 4), bool)), 2)
+    34.15
+    """
+    difference = picture[shown].astype(np.float64) - reference[shown]
+    return float(10.0 * np.log10(255.0**2 / max((difference**2).mean(), 1e-12)))
+
+
+def mean_brightness(frames: NDArray[np.uint8], shown: NDArray[np.bool_]) -> float:
+    """Mean of the 8-bit codes of frames (frames, H, W, 3) over the pixels ``shown``, in [0, 1]."""
+    return float(frames[:, shown].astype("float64").mean() / 255.0)

@@ -14,16 +14,16 @@ import pytest
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.graph import SSDF
-from pipelines import lowrank
 from pipelines.geometry import shapes
 from pipelines.ssdf_lighting import figures, scene
-from pipelines.ssdf_lighting.compression import compact, decoding, triangle_clusters
+from pipelines.ssdf_lighting.compression import compact, shared_basis, triangle_clusters
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes
 from pipelines.ssdf_lighting.compression.compact_memory import (
     cluster_bases,
-    packed,
+    pack,
     vertex_distances,
 )
+from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.distances import refined, visibility
 from pipelines.ssdf_lighting.drawing import frames
 from pipelines.ssdf_lighting.light import environment_fit
@@ -59,7 +59,7 @@ def test_every_asset_is_current_and_has_passed_every_check(good: Any) -> None:
 def test_the_stored_file_decodes_to_the_matrix(good: Any) -> None:
     matrix = _open(good, "ssdf_matrix", SCENE)["distances"].values
     stored = _open(good, "ssdf_basis", SCENE)
-    memory = packed(from_bytes(stored["file"].values.tobytes()))
+    memory = pack(from_bytes(stored["file"].values.tobytes()))
     assert memory.nbytes == stored["bytes_memory"]
     bases = cluster_bases(memory)
     rows = range(0, len(matrix), 97)
@@ -210,7 +210,7 @@ def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def _stepping(right: Callable[..., Any], decoder: Any, vertices: Any, axes: Any) -> Any:
-    steps = (decoder.cluster[vertices] % 2 * 0.05).astype(np.float32)
+    steps = (decoder.tables.cluster[vertices] % 2 * 0.05).astype(np.float32)
     return right(decoder, vertices, axes) + steps[:, None]
 
 
@@ -227,7 +227,7 @@ def _bright(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
 
 def _turned(right: Callable[..., Any], radiance: Any, *arguments: Any, **options: Any) -> Any:
     fit = right(radiance, *arguments, **options)
-    return environment_fit.judged(rotated(fit.lights, 70.0), radiance)
+    return environment_fit.evaluate_fit(rotated(fit.lights, 70.0), radiance)
 
 
 def _wrong_lights(
@@ -252,18 +252,18 @@ REGRESSIONS = (
     Regression("sign_error", refined, "refined_distances", _unsigned, SCENE),
     Regression("unused", triangle_clusters, "clusters_by_distance", _gaps, SCENE),
     Regression("compactness", triangle_clusters, "clusters_by_distance", _shuffled, SCENE),
-    Regression("basis_error", lowrank, "right_singular_vectors", _shrunk, SCENE),
-    Regression("over_budget", compact, "searched", _asked_for(1.5), SCENE),
-    Regression("sampled_rmse", figures, "compression_error", _half_the_errors, SCENE),
-    Regression("rmse", compact, "searched", _asked_for(1.09), SCENE),
-    Regression("byte_share", compact, "searched", _asked_for(0.5), SCENE),
-    Regression("wrong_visibility", decoding, "decoded_rows", _raised, SCENE),
-    Regression("border_step", compact, "searched", _uneven, SCENE),
+    Regression("basis_error", shared_basis, "right_singular_vectors", _shrunk, SCENE),
+    Regression("over_budget", compact, "quantise_to_rmse", _asked_for(1.5), SCENE),
+    Regression("sampled_rmse", figures, "compression_errors", _half_the_errors, SCENE),
+    Regression("rmse", compact, "quantise_to_rmse", _asked_for(1.09), SCENE),
+    Regression("byte_share", compact, "quantise_to_rmse", _asked_for(0.5), SCENE),
+    Regression("wrong_visibility", Decoder, "distances", _raised, SCENE),
+    Regression("border_step", compact, "quantise_to_rmse", _uneven, SCENE),
     Regression("flux_error", environment_fit, "fit_lights", _bright, SKY),
     Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
-    Regression("relit_psnr", decoding, "distances_along", _stepping, KEYS),
-    Regression("reference_psnr", frames, "traced", _wrong_lights, KEYS),
+    Regression("relit_psnr", Decoder, "distances_along", _stepping, KEYS),
+    Regression("reference_psnr", frames, "traced_reference", _wrong_lights, KEYS),
     Regression("coverage", frames, "scene_camera", _far_camera, KEYS),
     Regression(
         "mean_brightness",

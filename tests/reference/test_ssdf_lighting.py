@@ -15,7 +15,7 @@ from scipy.ndimage import binary_erosion
 from pipelines.drawing.stage import orbit
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.shapes import Mesh, sphere, square
-from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.drawing.ray_traced import ray_traced
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
@@ -60,7 +60,7 @@ def clearly_shown() -> NDArray[np.bool_]:
     meshes = objects()
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     triangles = np.concatenate([meshes[0].triangles, meshes[1].triangles + len(meshes[0].vertices)])
-    origins, ways = camera_rays(CAMERA, SIZE, pixel_middles(SIZE))
+    origins, ways = camera_rays(CAMERA, SIZE, pixel_centres(SIZE))
     hit = first_hits(build_scene(vertices, triangles), origins, ways).triangle
     kind = np.where(hit < 0, 2, np.where(hit < len(meshes[0].triangles), 0, 1))
     kind = kind.reshape(SIZE[::-1])

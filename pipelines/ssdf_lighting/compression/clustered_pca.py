@@ -15,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.compression.decoding import Decoder, make_decoder
-
 ReadRows = Callable[[NDArray[np.int64]], NDArray[np.float32]]
 """Rows (n, D) of the matrix by vertex number, ascending."""
 
@@ -65,7 +63,7 @@ def clustered_pca(
     for number in range(count):
         members = np.unique(triangles[cluster == number]).astype(np.int64)
         matrix = read(members)
-        left, sigma, right = left_factors(matrix)
+        left, sigma, right = gram_svd(matrix)
         if values is not None:
             kept = min(values, len(sigma))
         else:
@@ -88,10 +86,13 @@ def clustered_pca(
     )
 
 
-def left_factors(
+def gram_svd(
     matrix: NDArray[np.float32],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """SVD u (n, r), sigma (r,), v (r, D) of a matrix (n, D) by its smaller Gram matrix."""
+    """SVD u (n, r), sigma (r,), v (r, D) of a matrix (n, D) by its smaller Gram matrix.
+
+    Singular values that are rounding alone are left out, so r may be less than n and D.
+    """
     exact = matrix.astype(np.float64)
     wide = matrix.shape[0] <= matrix.shape[1]
     values, vectors = np.linalg.eigh(exact @ exact.T if wide else exact.T @ exact)
@@ -104,16 +105,3 @@ def left_factors(
     if wide:
         return vectors, sigma, ((exact.T @ vectors) / sigma).T.astype(np.float32)
     return (exact @ vectors) / sigma, sigma, vectors.T.astype(np.float32)
-
-
-def decoder_of_pca(pca: ClusteredPca, vertices: int) -> Decoder:
-    """A decoder; a vertex in several clusters is decoded from the first."""
-    rank = np.diff(pca.first)
-    sizes = np.diff(pca.row_first)
-    row_cluster = np.repeat(np.arange(len(sizes)), sizes)
-    row_start = np.concatenate([[0], np.cumsum(rank[row_cluster])])[:-1]
-    cluster, start = np.zeros(vertices, np.int64), np.zeros(vertices, np.int64)
-    cluster[pca.row_vertex[::-1]] = row_cluster[::-1]
-    start[pca.row_vertex[::-1]] = row_start[::-1]
-    centres = np.zeros((len(sizes), pca.vectors.shape[1]), np.float32)
-    return make_decoder(centres, pca.vectors, pca.first, cluster, pca.weights, start)

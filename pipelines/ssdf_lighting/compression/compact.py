@@ -13,7 +13,8 @@ precision. Here
 - vectors of the shared basis are rounded after a cosine transform of the octahedral square.
 
 X, the matrix in the weighted domain (weighted_sphere.py), is X_i = Q (mu_c + sum_k w_ik V_ck) for
-a vertex i of cluster c. `fit` makes the codes for a step; `searched` finds the step for a budget.
+a vertex i of cluster c. `quantise` makes the codes for a step; `quantise_to_rmse` and
+`quantise_to_bytes` find the step for a budget.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.ssdf_lighting.compression.shared_basis import SharedBasis
 from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +44,7 @@ _LEVELS_PER_OCTAVE = 4
 """Singular values are kept to this; only the product of both halves has to be exact."""
 
 
-class Compact(NamedTuple):
+class CompactCodes(NamedTuple):
     """Codes of a scene's SSDFs; everything is a whole number but the step.
 
     step: q, radians.
@@ -93,17 +95,7 @@ class ClusterFactors(NamedTuple):
     sigma: FloatArray
 
 
-class SharedBasis(NamedTuple):
-    """``vectors`` (D, R) orthonormal, ``sigma`` (R,): the scene's strongest; ``coordinates`` (V, R)
-    of the vertices in them; ``lost``, the sum of squares that they leave out."""
-
-    vectors: NDArray[np.float32]
-    sigma: FloatArray
-    coordinates: NDArray[np.float32]
-    lost: float
-
-
-def factorise(basis: SharedBasis, cluster: NDArray[np.int32]) -> list[ClusterFactors]:
+def cluster_factors(basis: SharedBasis, cluster: NDArray[np.int32]) -> list[ClusterFactors]:
     """The SVD of each cluster about its centre, in the shared basis."""
     factors = []
     for number in range(int(cluster.max()) + 1):
@@ -114,9 +106,9 @@ def factorise(basis: SharedBasis, cluster: NDArray[np.int32]) -> list[ClusterFac
     return factors
 
 
-def fit(
+def quantise(
     basis: SharedBasis, cluster: NDArray[np.int32], factors: list[ClusterFactors], step: float
-) -> Compact:
+) -> CompactCodes:
     """Round everything to a step q (radians), and leave out what is not worth its bits."""
     rank = _worth(basis.sigma, step, len(basis.vectors))
     shared_level = _levels(basis.sigma[:rank], step)
@@ -133,9 +125,9 @@ def fit(
         weights.append(_rounded(one.left[:, :kept], step).ravel())
         levels.append(level)
         ranks.append(kept)
-    return Compact(
+    return CompactCodes(
         float(step),
-        _rounded(cosines(scaled), step),
+        _rounded(cosine_transform(scaled), step),
         shared_level,
         np.stack(centres),
         np.concatenate(bases),
@@ -164,7 +156,7 @@ def _rounded(values: NDArray[np.floating], step: float) -> Codes:
     return np.where(values < 0, -sizes, sizes).astype(np.int32)
 
 
-def cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
+def cosine_transform(rows: NDArray[np.floating]) -> NDArray[np.floating]:
     """Orthonormal two-dimensional cosine transform of rows (R, n²) on the octahedral square."""
     from scipy.fft import dctn
 
@@ -174,8 +166,8 @@ def cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
     return dctn(rows.reshape(-1, n, n), axes=(1, 2), norm="ortho").reshape(rows.shape)
 
 
-def from_cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
-    """The inverse of `cosines`."""
+def inverse_cosine_transform(rows: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The inverse of `cosine_transform`."""
     from scipy.fft import idctn
 
     if not len(rows):
@@ -187,20 +179,20 @@ def from_cosines(rows: NDArray[np.floating]) -> NDArray[np.floating]:
 # ---- what the codes mean ---------------------------------------------------------------------
 
 
-def shared_vectors(compact: Compact) -> NDArray[np.float32]:
+def shared_vectors(compact: CompactCodes) -> NDArray[np.float32]:
     """Q (R, D) as decoded."""
-    scaled = from_cosines(compact.shared * compact.step)
+    scaled = inverse_cosine_transform(compact.shared * compact.step)
     return (scaled / sigma_of(compact.shared_level, compact.step)[:, None]).astype(np.float32)
 
 
-def cluster_vectors(compact: Compact) -> tuple[FloatArray, FloatArray]:
+def cluster_vectors(compact: CompactCodes) -> tuple[FloatArray, FloatArray]:
     """mu (K, R) and V (M, R) as decoded, in the shared basis."""
     sizes = np.maximum(compact.sizes, 1)[:, None]
     sigma = sigma_of(compact.level, compact.step)[:, None]
     return compact.centre * compact.step / np.sqrt(sizes), compact.basis * compact.step / sigma
 
 
-def coordinates(compact: Compact) -> NDArray[np.float32]:
+def decoded_coordinates(compact: CompactCodes) -> NDArray[np.float32]:
     """Coordinates (V, R) of the vertices in the shared basis, as decoded."""
     centres, vectors = cluster_vectors(compact)
     decoded = np.empty((len(compact.cluster), centres.shape[1]), np.float32)
@@ -213,7 +205,7 @@ def coordinates(compact: Compact) -> NDArray[np.float32]:
     return decoded
 
 
-def squared_error(basis: SharedBasis, compact: Compact) -> float:
+def squared_error(basis: SharedBasis, compact: CompactCodes) -> float:
     """Sum of squares of the error in memory, in the weighted domain, without touching the matrix.
 
     With C the coordinates, Q the shared basis (orthonormal), and C', Q' what is decoded of them,
@@ -221,7 +213,7 @@ def squared_error(basis: SharedBasis, compact: Compact) -> float:
     angles to the first, and to the second but for what is rounding of rounding.
     """
     rank = len(compact.shared)
-    decoded = coordinates(compact).astype(np.float64)
+    decoded = decoded_coordinates(compact).astype(np.float64)
     missed = basis.coordinates.astype(np.float64)
     missed[:, :rank] -= decoded
     off = (basis.vectors[:, :rank].T - shared_vectors(compact)).astype(np.float64)
@@ -231,13 +223,13 @@ def squared_error(basis: SharedBasis, compact: Compact) -> float:
     return float((missed**2).sum() + rounding + both + again + basis.lost)
 
 
-def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Compact:
+def quantise_to_rmse(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> CompactCodes:
     """The codes of about the largest step whose RMSE (radians, weighted by solid angle) is at most
     ``rmse``. ``cluster`` (V,) of the vertices, without gaps.
 
     Raises ValueError where the shared basis alone misses more than that.
     """
-    factors = factorise(basis, cluster)
+    factors = cluster_factors(basis, cluster)
     entries = basis.coordinates.shape[0] * basis.vectors.shape[0]
     if basis.lost >= rmse**2 * entries:
         raise ValueError(
@@ -248,11 +240,11 @@ def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Com
     # Over what the basis leaves out the error grows with the step.
     limit = math.sqrt(rmse**2 * entries - basis.lost)
 
-    def measured(tried: Compact) -> float:
+    def measured(tried: CompactCodes) -> float:
         return math.sqrt(max(squared_error(basis, tried) - basis.lost, 0.0))
 
     found = _largest(
-        lambda step: fit(basis, cluster, factors, step),
+        lambda step: quantise(basis, cluster, factors, step),
         measured,
         limit,
         20.0 * limit / math.sqrt(entries),
@@ -262,19 +254,22 @@ def searched(basis: SharedBasis, cluster: NDArray[np.int32], rmse: float) -> Com
     return found
 
 
-def searched_for_bytes(
+def quantise_to_bytes(
     basis: SharedBasis,
     cluster: NDArray[np.int32],
-    count: Callable[[Compact], int],
+    count: Callable[[CompactCodes], int],
     budget: int,
-) -> Compact:
+) -> CompactCodes:
     """The codes of about the smallest step that ``count`` (of bytes) finds within the budget.
 
     Raises ValueError where no step does.
     """
-    factors = factorise(basis, cluster)
+    factors = cluster_factors(basis, cluster)
     found = _largest(
-        lambda fineness: fit(basis, cluster, factors, 1.0 / fineness), count, float(budget), 5.0
+        lambda fineness: quantise(basis, cluster, factors, 1.0 / fineness),
+        count,
+        float(budget),
+        5.0,
     )
     if found is None:
         raise ValueError(f"{budget} bytes are out of reach; expected more.")
@@ -282,11 +277,11 @@ def searched_for_bytes(
 
 
 def _largest(
-    make: Callable[[float], Compact],
-    measured: Callable[[Compact], float],
+    make: Callable[[float], CompactCodes],
+    measured: Callable[[CompactCodes], float],
     limit: float,
     start: float,
-) -> Compact | None:
+) -> CompactCodes | None:
     """What ``make`` makes of about the largest number whose measure, which grows with it, is within
     the limit; None where none is found."""
     low, high, number = 0.0, np.inf, start

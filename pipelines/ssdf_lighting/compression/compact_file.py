@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.compression.compact import Codes, Compact
+from pipelines.ssdf_lighting.compression.compact import Codes, CompactCodes
 from pipelines.ssdf_lighting.compression.entropy_coding import decode, encode
 from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 
@@ -29,7 +29,7 @@ _MOST_A_BYTE = 12_000
 """Numbers that a byte can hold: the surest answer costs -log2(65504 / 65536) bits."""
 
 
-def to_bytes(compact: Compact) -> bytes:
+def to_bytes(compact: CompactCodes) -> bytes:
     """The file's bytes."""
     rank, count = len(compact.shared), len(compact.ranks)
     header = _HEADER.pack(
@@ -63,7 +63,7 @@ def to_bytes(compact: Compact) -> bytes:
     return header + struct.pack("<I", len(first)) + first + large
 
 
-def from_bytes(data: bytes) -> Compact:
+def from_bytes(data: bytes) -> CompactCodes:
     """The codes of a file.
 
     Raises ValueError for what is no such file, ends too early or does not fit together.
@@ -97,7 +97,7 @@ def from_bytes(data: bytes) -> Compact:
     large = decode(data[start + length :], _contexts(n, shared_level, level, ranks, sizes))
     cuts = np.cumsum([rank * n * n, count * rank, total * rank])
     shared, centre, basis, rest = np.split(large, cuts)
-    return Compact(
+    return CompactCodes(
         step,
         shared.reshape(rank, n * n),
         shared_level,

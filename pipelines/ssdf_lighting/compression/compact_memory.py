@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pipelines.ssdf_lighting.compression.compact import (
     MEMORY_STEP,
     Codes,
-    Compact,
+    CompactCodes,
     shared_vectors,
     sigma_of,
 )
@@ -29,7 +29,7 @@ _WHOLE = {32: "<i4", 16: "<i2", 8: "i1"}
 """Bits of numbers of whole bytes, in the order of a row."""
 
 
-class Packed(NamedTuple):
+class PackedCodes(NamedTuple):
     """A scene's SSDFs as they stay in memory.
 
     shared: (D, bytes) rows of codes over the R vectors; shared_bits: (R,); shared_scale: (R,).
@@ -64,7 +64,7 @@ class Packed(NamedTuple):
         return sum(part.nbytes for part in self)
 
 
-def packed(compact: Compact) -> Packed:
+def pack(compact: CompactCodes) -> PackedCodes:
     """Pack codes for memory."""
     shared_scale = MEMORY_STEP * compact.step / sigma_of(compact.shared_level, compact.step)
     shared = np.rint(shared_vectors(compact) / shared_scale[:, None]).astype(np.int32).T
@@ -74,13 +74,13 @@ def packed(compact: Compact) -> Packed:
     rows, bits, starts, start, read = [], [], [], 0, 0
     for size, rank in zip(sizes, compact.ranks, strict=True):
         codes = compact.weights[read : read + size * rank].reshape(size, rank)
-        bits.append(widths(codes))
+        bits.append(column_bits(codes))
         rows.append(pack_rows(codes, bits[-1]).ravel())
         starts.append(start)
         start, read = start + len(rows[-1]), read + size * rank
-    shared_bits, centre_bits = widths(shared), widths(compact.centre)
-    basis_bits = widths(compact.basis)
-    return Packed(
+    shared_bits, centre_bits = column_bits(shared), column_bits(compact.centre)
+    basis_bits = column_bits(compact.basis)
+    return PackedCodes(
         pack_rows(shared, shared_bits),
         shared_bits,
         shared_scale.astype(np.float32),
@@ -100,7 +100,7 @@ def packed(compact: Compact) -> Packed:
     )
 
 
-def widths(codes: Codes) -> Bytes:
+def column_bits(codes: Codes) -> Bytes:
     """Bits (columns,) uint8, 4, 8, 16 or 32, that the columns of codes (rows, columns) need."""
     low, high = codes.min(axis=0, initial=0), codes.max(axis=0, initial=0)
     needed = np.maximum(high, -1 - low)
@@ -156,7 +156,7 @@ class ClusterBases(NamedTuple):
     first: NDArray[np.int64]
 
 
-def cluster_bases(memory: Packed) -> ClusterBases:
+def cluster_bases(memory: PackedCodes) -> ClusterBases:
     """Expand the clusters' vectors."""
     shared = unpack_rows(memory.shared, memory.shared_bits) * memory.shared_scale
     shared = (shared / root_weights(len(shared))[:, None]).astype(np.float32)
@@ -169,7 +169,7 @@ def cluster_bases(memory: Packed) -> ClusterBases:
     )
 
 
-def vertex_distances(memory: Packed, bases: ClusterBases, vertex: int) -> NDArray[np.float32]:
+def vertex_distances(memory: PackedCodes, bases: ClusterBases, vertex: int) -> NDArray[np.float32]:
     """d (D,) float32, radians, of one vertex: one read of its bytes."""
     cluster = int(memory.cluster[vertex])
     own = slice(bases.first[cluster], bases.first[cluster + 1])

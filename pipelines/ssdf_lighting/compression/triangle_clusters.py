@@ -7,14 +7,12 @@ takes half as many values for the same error (docs/ssdf.md).
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.clustering import k_means_from_farthest, k_means_plus_plus
-
-Space = Literal["distances", "positions"]
 
 _LEADING = 32
 """Coordinates in the shared basis by which SSDFs are compared."""
@@ -54,7 +52,7 @@ def leading_coordinates(coordinates: NDArray[np.float32]) -> NDArray[np.float64]
     return coordinates[:, :_LEADING].astype(np.float64)
 
 
-def spread_inside(
+def within_cluster_spread(
     features: NDArray[np.float64], triangles: NDArray[np.integer], labels: NDArray[np.int32]
 ) -> float:
     """Spread of the triangles' features inside clusters, over that of all; ``features`` (V, k)."""

@@ -20,13 +20,25 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
+NO_EDGE = math.pi
+"""|d| where nothing is hidden, or everything: the farthest that an edge could be."""
 
-class Taps(NamedTuple):
+
+class BilinearTaps(NamedTuple):
     """Bilinear interpolation: ``texels`` (..., 4) int32 numbers and ``weights`` (..., 4) float64,
     which sum to 1."""
 
     texels: NDArray[np.int32]
     weights: FloatArray
+
+
+class DelaunaySides(NamedTuple):
+    """``ends`` (E, 2) int32, directions at both ends of each side; ``triangles`` (T, 3) int32,
+    directions at the corners; ``of_triangle`` (T, 3) int32, the sides after each corner."""
+
+    ends: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    of_triangle: NDArray[np.int32]
 
 
 def resolution_of(directions: int) -> int:
@@ -120,7 +132,16 @@ def delaunay_triangles(n: int) -> NDArray[np.int32]:
     return corners
 
 
-def taps(directions: ArrayLike, n: int) -> Taps:
+@functools.lru_cache(maxsize=4)
+def delaunay_sides(n: int) -> DelaunaySides:
+    """Sides of the Delaunay triangles of n x n directions."""
+    triangles = delaunay_triangles(n)
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
+    sides, number = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    return DelaunaySides(sides, triangles, number.reshape(-1, 3).astype(np.int32))
+
+
+def bilinear_taps(directions: ArrayLike, n: int) -> BilinearTaps:
     """The four texels around directions (..., 3), and their weights.
 
     Beyond the square's border lies the same border, mirrored about its middle.
@@ -136,7 +157,7 @@ def taps(directions: ArrayLike, n: int) -> Taps:
     weights = np.stack(
         [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right], axis=-1
     )
-    return Taps(texels, weights)
+    return BilinearTaps(texels, weights)
 
 
 def _wrapped(row: NDArray[np.int64], column: NDArray[np.int64], n: int) -> NDArray[np.int32]:

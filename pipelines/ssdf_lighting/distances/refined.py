@@ -18,10 +18,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.geometry.rays import occluded
-from pipelines.ssdf_lighting.distances.octahedral import directions_of, square_of, texel_directions
+from pipelines.ssdf_lighting.distances.octahedral import (
+    delaunay_sides,
+    directions_of,
+    square_of,
+    texel_directions,
+)
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_arcs
 from pipelines.ssdf_lighting.distances.visibility import RayOrigins
-from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, delaunay_sides, visible_edge
+from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, visible_edge
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene

@@ -19,11 +19,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.distances.octahedral import texel_directions
-from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, delaunay_sides
-
-NO_EDGE = math.pi
-"""|d| where nothing is hidden, or everything: the farthest that an edge could be."""
+from pipelines.ssdf_lighting.distances.octahedral import delaunay_sides, texel_directions
+from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge
 
 _TILE = 4
 _FAR = 16.0  # squared chords are at most 4

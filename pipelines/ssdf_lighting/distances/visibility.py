@@ -8,13 +8,15 @@ still free is taken, and where none is, the vertex is sealed and sees nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.rays import first_hits, occluded
+from pipelines.geometry.rays import build_scene, first_hits, occluded
 from pipelines.geometry.repair import connected, edge_ends, edges
+from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene
@@ -33,6 +35,8 @@ _CLEARANCE = 0.15
 """Room around a ray's origin, in its height."""
 _MOST_PIECES = 256
 """Geometries that the surfaces are told apart by."""
+_BLOCK = 256
+"""Vertices whose rays are in memory together."""
 
 
 class RayOrigins(NamedTuple):
@@ -96,7 +100,70 @@ def visible_directions(
     return ~blocked.reshape(count, -1) & ~origins.sealed[:, None]
 
 
-def stand_ins(
+class SceneVisibility(NamedTuple):
+    """What is stored of each of V vertices: of a buried one what its stand-in sees.
+
+    visible: (V, bytes) uint8, a bit a direction, the first direction in a byte's highest bit.
+    origins: where the rays started. stored: (V,) int64, the vertex that each row is of.
+    sealed: number of the vertices that other surfaces cover on all sides.
+    """
+
+    visible: NDArray[np.uint8]
+    origins: RayOrigins
+    stored: NDArray[np.int64]
+    sealed: int
+
+    @property
+    def buried(self) -> int:
+        """Number of the vertices that have a stand-in."""
+        return int((self.stored != np.arange(len(self.stored))).sum())
+
+
+def scene_visibility(
+    vertices: FloatArray,
+    triangles: NDArray[np.integer],
+    normals: FloatArray,
+    n: int,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> SceneVisibility:
+    """Cast rays from vertices (V, 3) in n x n directions, block by block; normals (V, 3) unit.
+
+    >>> from pipelines.geometry.shapes import sphere
+    >>> ball = sphere(8)
+    >>> found = scene_visibility(ball.vertices, ball.triangles, ball.normals, 16)
+    >>> found.visible.shape[1], found.sealed
+    (32, 0)
+    """
+    scene = build_scene(vertices, triangles)
+    origins = ray_origins(scene, vertices, triangles, normals)
+    directions = texel_directions(n)
+    bits = np.empty((len(vertices), (n * n + 7) // 8), np.uint8)
+    share = np.empty(len(bits))
+    for first in range(0, len(bits), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        some = RayOrigins(origins.points[block], origins.sealed[block])
+        seen = visible_directions(scene, some, directions)
+        bits[block], share[block] = np.packbits(seen, axis=1), seen.mean(axis=1)
+        progress(first / len(bits))
+    stored = stand_ins_for_buried(scene, vertices, triangles, normals, origins, share, directions)
+    return SceneVisibility(
+        bits[stored],
+        RayOrigins(origins.points[stored], origins.sealed[stored]),
+        stored,
+        int(origins.sealed.sum()),
+    )
+
+
+def unpacked(visible: NDArray[np.uint8], directions: int) -> NDArray[np.bool_]:
+    """Visibility (V, directions) of bits (V, bytes).
+
+    >>> unpacked(np.array([[0b10110000]], np.uint8), 4).tolist()
+    [[True, False, True, True]]
+    """
+    return np.unpackbits(visible, axis=1)[:, :directions].astype(bool)
+
+
+def stand_ins_for_buried(
     scene: RaycastingScene,
     vertices: FloatArray,
     triangles: NDArray[np.integer],

@@ -9,7 +9,6 @@ their right.
 
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,22 +16,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.geometry.rays import occluded
-from pipelines.ssdf_lighting.distances.octahedral import delaunay_triangles, texel_directions
+from pipelines.ssdf_lighting.distances.octahedral import delaunay_sides, texel_directions
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene
 
 ROUNDS = 4
 """Rays along a pair of neighbours: each halves the place of the crossing, 1/32 of it is left."""
-
-
-class DelaunaySides(NamedTuple):
-    """``ends`` (E, 2) int32, directions at both ends of each side; ``triangles`` (T, 3) int32,
-    directions at the corners; ``of_triangle`` (T, 3) int32, the sides after each corner."""
-
-    ends: NDArray[np.int32]
-    triangles: NDArray[np.int32]
-    of_triangle: NDArray[np.int32]
 
 
 class VisibleEdge(NamedTuple):
@@ -46,15 +36,6 @@ class VisibleEdge(NamedTuple):
     crossings: NDArray[np.float32]
     arcs: NDArray[np.int32]
     starts: NDArray[np.int64]
-
-
-@functools.lru_cache(maxsize=4)
-def delaunay_sides(n: int) -> DelaunaySides:
-    """Sides of the Delaunay triangles of n x n directions."""
-    triangles = delaunay_triangles(n)
-    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
-    sides, number = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    return DelaunaySides(sides, triangles, number.reshape(-1, 3).astype(np.int32))
 
 
 def visible_edge(

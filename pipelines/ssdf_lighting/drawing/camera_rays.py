@@ -37,7 +37,7 @@ def camera_rays(
     return np.broadcast_to(position, offsets.shape), _unit(forward + offsets)
 
 
-def pixel_middles(size: tuple[int, int]) -> FloatArray:
+def pixel_centres(size: tuple[int, int]) -> FloatArray:
     """Places (width * height, 2) of the pixels' middles, row by row from the top."""
     width, height = size
     column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -52,7 +52,7 @@ def eye(camera: Camera) -> NDArray[np.float64]:
     return np.append(position, 1.0)
 
 
-def views(camera: Camera, points: FloatArray) -> FloatArray:
+def view_vectors(camera: Camera, points: FloatArray) -> FloatArray:
     """Unit vectors (P, 3) from points (P, 3) towards the camera."""
     seen_from = eye(camera)
     return _unit(seen_from[:3] - seen_from[3] * points)

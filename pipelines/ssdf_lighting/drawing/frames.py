@@ -1,4 +1,4 @@
-"""Pictures of a lit scene: turning light, the same not compressed, the same traced with rays."""
+"""A lit scene under turning light, beside it what was not compressed and what rays find."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
 
 Progress = Callable[[float], None]
-LookUp = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
+DistancesAlong = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
 """Vertices (P,) and axes (P, L, 3) -> d (P, L), radians."""
 
 VIEW_ANGLE = 30.0
 _BACKGROUND = (0.02, 0.02, 0.025)
 
 
-class Turn(NamedTuple):
-    """The scene under turning light. radiance: (frames, H, W, 3) float32; covered: (H, W) float32;
-    seconds: (frames,) of each, the first with building the shaders; renderer: its name."""
+class TurningLight(NamedTuple):
+    """The scene under turning light.
+
+    radiance: (frames, H, W, 3) float32; covered: (H, W) float32.
+    seconds: (frames,) of each, the first with building the shaders; renderer: its name.
+    """
 
     radiance: NDArray[np.float32]
     covered: NDArray[np.float32]
@@ -53,20 +56,20 @@ def scene_camera(scene: Scene, azimuth: float, elevation: float, aspect: float) 
     return orbit(target, 1.25 * distance, azimuth, elevation, view_angle=VIEW_ANGLE)
 
 
-def turning(
+def draw_turning_light(
     scene: Scene,
     lights: Lights,
-    look_up: LookUp,
+    distances_along: DistancesAlong,
     camera: Camera,
     size: tuple[int, int],
     turns: Sequence[float],
     progress: Progress = lambda fraction: None,
     *,
     supersampling: int = 1,
-) -> Turn:
+) -> TurningLight:
     """Draw the scene for each turn (degrees about up) of its lights.
 
-    ``look_up`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
+    ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
     """
     split = split_by_part(scene)
     actor = LitActor(*split.mesh, lights)
@@ -76,17 +79,19 @@ def turning(
         stage.look(camera)
         for number, turn in enumerate(turns):
             begin = time.perf_counter()
-            actor.relight(camera, rotated(lights, turn), lambda axes: look_up(split.source, axes))
+            actor.relight(
+                camera, rotated(lights, turn), lambda axes: distances_along(split.source, axes)
+            )
             stage.draw()
             seconds.append(time.perf_counter() - begin)
             pictures.append(stage.radiance())
             progress((number + 1) / len(turns))
         renderer = stage.renderer_name
     frames = np.stack(pictures)
-    return Turn(frames[..., :3], frames[0, ..., 3], np.array(seconds), renderer)
+    return TurningLight(frames[..., :3], frames[0, ..., 3], np.array(seconds), renderer)
 
 
-def traced(
+def traced_reference(
     scene: Scene,
     lights: Lights,
     camera: Camera,
@@ -106,6 +111,73 @@ def traced(
         seed=seed,
         progress=progress,
         jittered=False,
+    )
+
+
+class RelitFrames(NamedTuple):
+    """A scene under turning light with what it is compared with, 8-bit sRGB (…, H, W, 3) at one
+    exposure.
+
+    frames: (frames, H, W, 3); uncompressed, reference: the first of them, of the SSDFs before
+    compression and traced.
+    exposure: what radiance was multiplied by. turning: the frames' radiance, times and renderer.
+    """
+
+    frames: NDArray[np.uint8]
+    uncompressed: NDArray[np.uint8]
+    reference: NDArray[np.uint8]
+    exposure: float
+    turning: TurningLight
+
+
+class ComparedDistances(NamedTuple):
+    """d along axes, decoded and as it was before compression."""
+
+    compressed: DistancesAlong
+    uncompressed: DistancesAlong
+
+
+def relit_frames(
+    scene: Scene,
+    lights: Lights,
+    distances: ComparedDistances,
+    camera: Camera,
+    size: tuple[int, int],
+    turns: Sequence[float],
+    samples: int,
+    progress: Progress = lambda fraction: None,
+) -> RelitFrames:
+    """Draw every turn (degrees) of the lights; of the first also what it is compared with.
+
+    ``samples`` >= 2, rays a pixel of the traced picture. Raises ValueError as ``LitActor``.
+    """
+    turning = draw_turning_light(
+        scene,
+        lights,
+        distances.compressed,
+        camera,
+        size,
+        turns,
+        lambda fraction: progress(0.3 * fraction),
+    )
+    exact = draw_turning_light(scene, lights, distances.uncompressed, camera, size, turns[:1])
+    progress(0.4)
+    reference = traced_reference(
+        scene,
+        lights,
+        camera,
+        size,
+        samples,
+        progress=lambda fraction: progress(0.4 + 0.6 * fraction),
+    ).radiance
+    scale = scene_exposure(turning)
+    backdrop = turning.radiance[0] * (reference[..., 3:] == 0)
+    return RelitFrames(
+        exposed(turning.radiance, scale),
+        exposed(exact.radiance[0], scale),
+        exposed(reference[..., :3] + backdrop, scale),
+        scale,
+        turning,
     )
 
 
@@ -130,19 +202,11 @@ def cluster_picture(
         return stage.frame()
 
 
-def psnr(
-    picture: NDArray[np.uint8], reference: NDArray[np.uint8], shown: NDArray[np.bool_]
-) -> float:
-    """Peak signal to noise ratio (dB) of 8-bit pictures (H, W, 3) over the pixels ``shown``."""
-    difference = picture[shown].astype(np.float64) - reference[shown]
-    return float(10.0 * np.log10(255.0**2 / max((difference**2).mean(), 1e-12)))
-
-
 def exposed(radiance: NDArray[np.floating], scale: float) -> NDArray[np.uint8]:
     """Radiance as an 8-bit sRGB picture."""
     return to_8bit(radiance * scale)
 
 
-def scene_exposure(turn: Turn) -> float:
+def scene_exposure(turn: TurningLight) -> float:
     """Factor that brings the brighter part of the scene's pixels, of all frames, to 0.8."""
     return exposure(turn.radiance[:, turn.covered > 0.5])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits
-from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles, views
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres, view_vectors
 from pipelines.ssdf_lighting.light.shading import lobe_tables, lobes, shaded
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, visible_table
 from pipelines.ssdf_lighting.scene import LitMesh
@@ -36,9 +36,11 @@ def render_numpy(
     """
     points, corners, shading, material, materials = mesh
     tables, shares = lobe_tables(materials, lights), visible_table()
-    at_vertices = lobes(shading, views(camera, points), material, materials, lights, tables=tables)
+    at_vertices = lobes(
+        shading, view_vectors(camera, points), material, materials, lights, tables=tables
+    )
     distances = np.asarray(distances_at(at_vertices.axes.astype(np.float32)), np.float64)
-    origins, ways = camera_rays(camera, size, pixel_middles(size))
+    origins, ways = camera_rays(camera, size, pixel_centres(size))
     hits = first_hits(build_scene(points, corners), origins, ways)
     picture = np.zeros((len(origins), 4))
     seen = np.flatnonzero(hits.triangle >= 0)
@@ -49,7 +51,12 @@ def render_numpy(
         normal = np.einsum("pk,pkc->pc", weight, shading[corner])
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         found = lobes(
-            normal, views(camera, at), material[corner[:, 0]], materials, lights, tables=tables
+            normal,
+            view_vectors(camera, at),
+            material[corner[:, 0]],
+            materials,
+            lights,
+            tables=tables,
         )
         between = np.einsum("pk,pkl->pl", weight, distances[corner])
         picture[block, :3] = shaded(found, between, shares)

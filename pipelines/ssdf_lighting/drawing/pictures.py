@@ -39,7 +39,7 @@ def basis_picture(vectors: NDArray[np.floating]) -> NDArray[np.uint8]:
     return maps_picture(vectors / np.abs(vectors).max(axis=1, keepdims=True), limit=1.0)
 
 
-def sizes_picture(cluster: NDArray[np.integer]) -> NDArray[np.uint8]:
+def cluster_sizes_picture(cluster: NDArray[np.integer]) -> NDArray[np.uint8]:
     """How many vertices the clusters have, from the largest to the smallest."""
     sizes = np.sort(np.bincount(cluster))[::-1]
     figure, canvas = new_figure(5.0, 2.6)
@@ -62,7 +62,7 @@ def error_histogram(vertex_rmse: NDArray[np.floating], rmse: float) -> NDArray[n
     return drawn(canvas)
 
 
-def curve_picture(curve: Mapping[str, Mapping[str, Any]]) -> NDArray[np.uint8]:
+def rate_distortion_picture(curve: Mapping[str, Mapping[str, Any]]) -> NDArray[np.uint8]:
     """Bytes against error, by the number of clusters: the paper's form for 4 to 96 values, the
     compact one for several steps (``paper``: values, bytes, error; ``ours``: step, bytes of the
     file, in memory, error)."""

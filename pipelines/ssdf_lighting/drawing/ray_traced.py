@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits, occluded
-from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_middles
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.light.microfacets import Materials, beckmann, check_materials, gloss
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
 from pipelines.ssdf_lighting.scene import LitMesh
@@ -82,7 +82,7 @@ def ray_traced(
     check_materials(mesh.materials)
     scene = build_scene(mesh.vertices, mesh.triangles)
     surface = _surface(mesh)
-    middles = pixel_middles(size)
+    middles = pixel_centres(size)
     picture, error = np.zeros((len(middles), 4)), np.zeros((len(middles), 3))
     rows = max(1, _AT_ONCE // samples)
     for first in range(0, len(middles), rows):

@@ -20,8 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import i0e, i1e
 
-from pipelines.ssdf_lighting.light.spherical_gaussians import VisibleTable, looked_up
-
 FloatArray = NDArray[np.float64]
 
 COLUMNS = 513
@@ -76,20 +74,13 @@ def cosine_lobes(sharpness: ArrayLike) -> CosineLobes:
     faded = np.exp(sharp[..., 0] * (brightest[..., 0] - 1))
     return CosineLobes(
         2 * math.pi * total * faded,
-        sharpness_of(length / total),
+        sharpness_of_resultant(length / total),
         sideways / length,
         (upwards - sideways * cosine) / length,
     )
 
 
-def whole_shares(lobes: CosineLobes, table: VisibleTable) -> FloatArray:
-    """f (N, COLUMNS) of each lobe at its own horizon, in [0.5, 1]."""
-    cosine = np.linspace(-1.0, 1.0, COLUMNS)
-    horizon = np.arcsin(np.clip(lobes.along * cosine + lobes.up, -1.0, 1.0))
-    return looked_up(table, horizon, lobes.sharpness)
-
-
-def sharpness_of(length: ArrayLike) -> FloatArray:
+def sharpness_of_resultant(length: ArrayLike) -> FloatArray:
     """λ of the SG whose mean direction is this long: coth λ - 1 / λ, between 0 and 1.
 
     Banerjee's approximation, mended by Newton's method.

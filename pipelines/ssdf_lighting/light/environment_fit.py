@@ -106,7 +106,7 @@ def fit_lights(
             f"sharpness is {least_sharpness:g} to {most_sharpness:g}; expected a finite range "
             "above 0."
         )
-    map_ = averaged(radiance, _HEIGHT)
+    map_ = downsampled(radiance, _HEIGHT)
     level = float(_fluxes(map_).mean()) / (4.0 * math.pi)
     map_ /= level
     blur = 1.0 / (1.0 / _BLUR + 1.0 / most_sharpness)
@@ -121,7 +121,7 @@ def fit_lights(
     lights = Lights(
         blobs.axes, sharpness, _with_flux(target, blobs, integral(sharpness), _fluxes(map_))
     )
-    fit = judged(lights, map_)
+    fit = evaluate_fit(lights, map_)
     progress(1.0)
     return fit._replace(lights=lights._replace(amplitudes=lights.amplitudes * level))
 
@@ -129,7 +129,7 @@ def fit_lights(
 # ---- the map ---------------------------------------------------------------------------------
 
 
-def averaged(radiance: NDArray[np.floating], height: int) -> FloatArray:
+def downsampled(radiance: NDArray[np.floating], height: int) -> FloatArray:
     """A map's means over the texels of a map of another height: (height, 2 height, 3) float64.
 
     Means are over solid angle, so the flux stays. Raises ValueError for height < 1.
@@ -353,9 +353,9 @@ def _normal_equations(
 # ---- how good it is --------------------------------------------------------------------------
 
 
-def judged(lights: Lights, radiance: NDArray[np.floating]) -> Fit:
+def evaluate_fit(lights: Lights, radiance: NDArray[np.floating]) -> Fit:
     """The errors of lights against a map (H, 2 H, 3), averaged down to 64 rows."""
-    map_ = averaged(radiance, _HEIGHT)
+    map_ = downsampled(radiance, _HEIGHT)
     height = len(map_)
     ways, true = texel_directions(height).reshape(-1, 3), map_.reshape(-1, 3)
     omega = np.repeat(solid_angles(height), 2 * height)

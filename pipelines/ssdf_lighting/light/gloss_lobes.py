@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.light.cosine_lobes import sharpness_of
+from pipelines.ssdf_lighting.light.cosine_lobes import sharpness_of_resultant
 from pipelines.ssdf_lighting.light.microfacets import LEAST_VIEW, Materials, fresnel, smith
 from pipelines.ssdf_lighting.light.spherical_gaussians import integral
 
@@ -69,7 +69,7 @@ def gloss_lobes(materials: Materials) -> GlossLobes:
         albedo = share.sum(axis=(1, 2))
         x, z = (np.sum(share * part, axis=(1, 2)) for part in (x_i, n_i))
         length = np.hypot(x, z)
-        sharpness = sharpness_of(length / albedo)
+        sharpness = sharpness_of_resultant(length / albedo)
         along = x / length / sine
         found[0, row], found[1, row] = sharpness, along
         found[2, row] = z / length - along * cosine

@@ -26,8 +26,8 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import (
     Lights,
     VisibleTable,
     integral,
-    looked_up,
     product,
+    visible_share,
 )
 
 FloatArray = NDArray[np.float64]
@@ -92,8 +92,8 @@ def lobes(
 
 def shaded(lobes: Lobes, distances: NDArray[np.floating], table: VisibleTable) -> FloatArray:
     """Radiance (P, 3) float64, where d at the lobes' axes is ``distances`` (P, L), radians."""
-    shares = looked_up(table, distances, lobes.sharpness)
-    whole = looked_up(table, lobes.horizons, lobes.sharpness)
+    shares = visible_share(table, distances, lobes.sharpness)
+    whole = visible_share(table, lobes.horizons, lobes.sharpness)
     visible = np.minimum(shares / np.maximum(whole, _LEAST_WHOLE), 1.0)
     return np.einsum("pl,plc->pc", visible, lobes.weights)
 

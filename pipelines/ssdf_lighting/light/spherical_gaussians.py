@@ -199,7 +199,7 @@ def visible_table(rows: int = _ROWS, columns: int = _COLUMNS) -> VisibleTable:
     return VisibleTable(np.clip(share, 0.5, 1.0).astype(np.float32))
 
 
-def looked_up(table: VisibleTable, distance: ArrayLike, sharpness: ArrayLike) -> FloatArray:
+def visible_share(table: VisibleTable, distance: ArrayLike, sharpness: ArrayLike) -> FloatArray:
     """Share of an SG that is visible, f(d, λ) / integral(λ) in [0, 1], float64; broadcast.
 
     Linear between the entries of the table. Distances in radians,

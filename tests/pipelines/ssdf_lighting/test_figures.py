@@ -20,7 +20,7 @@ from pipelines.ssdf_lighting.distances.visible_edge import visible_edge
 from pipelines.ssdf_lighting.figures import (
     all_pairs_distances,
     border_step,
-    compression_error,
+    compression_errors,
     distance_error,
     sampled_rows,
     visibility_error,
@@ -151,9 +151,9 @@ def test_compression_errors_are_weighted_by_solid_angle() -> None:
     right = distances_to_samples(visible)
     normals = np.tile([0.0, 0.0, 1.0], (8, 1))
     blocks = [(np.arange(0, 3), right[:3]), (np.arange(3, 8), right[3:])]
-    none = compression_error(blocks, lambda rows: right[rows], normals)
+    none = compression_errors(blocks, lambda rows: right[rows], normals)
     assert none.rmse == none.wrong_visibility == 0
-    off = compression_error(blocks, lambda rows: right[rows] + np.float32(0.25), normals)
+    off = compression_errors(blocks, lambda rows: right[rows] + np.float32(0.25), normals)
     assert off.rmse == pytest.approx(0.25, rel=1e-5)
     np.testing.assert_allclose(off.vertex_rmse, 0.25, rtol=1e-5)
     # One texel of one vertex: by its share of the sphere.
@@ -161,7 +161,7 @@ def test_compression_errors_are_weighted_by_solid_angle() -> None:
     texel = int(np.flatnonzero(visible[4])[5])
     wrong[4, texel] = -1.0
     share = solid_angles(N)[texel] / (4 * math.pi)
-    found = compression_error(blocks, lambda rows: wrong[rows], normals)
+    found = compression_errors(blocks, lambda rows: wrong[rows], normals)
     change = (right[4, texel] + 1.0) ** 2 * share
     assert found.rmse == pytest.approx(math.sqrt(change / 8), rel=1e-5)
     assert found.vertex_rmse[4] == pytest.approx(math.sqrt(change), rel=1e-5)
@@ -170,7 +170,7 @@ def test_compression_errors_are_weighted_by_solid_angle() -> None:
     # Below the tangent plane signs do not count.
     below = right.copy()
     below[:, WAYS[:, 2] < -1e-9] *= -1
-    assert compression_error(blocks, lambda rows: below[rows], normals).wrong_visibility == 0
+    assert compression_errors(blocks, lambda rows: below[rows], normals).wrong_visibility == 0
 
 
 def grid(size: int) -> NDArray[np.int32]:

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from pipelines.ssdf_lighting.compression.clustered_pca import (
     ClusteredPca,
     clustered_pca,
-    decoder_of_pca,
-    left_factors,
+    gram_svd,
 )
-from pipelines.ssdf_lighting.compression.decoding import decoded_rows
+from pipelines.ssdf_lighting.compression.decoder_tables import decoded_rows, tables_of_pca
 
 Matrix = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -93,7 +92,7 @@ def test_the_whole_contribution_and_more_values_than_there_are_keep_everything()
     for pca in (compressed(matrix, contribution=1.0), compressed(matrix, values=500)):
         assert (pca.relative_error < 1e-5).all()
         assert (np.diff(pca.first) <= np.diff(pca.row_first)).all()
-        found = decoded_rows(decoder_of_pca(pca, len(matrix)), np.arange(len(matrix)))
+        found = decoded_rows(tables_of_pca(pca, len(matrix)), np.arange(len(matrix)))
         np.testing.assert_allclose(found, matrix, atol=1e-4)
     assert len(np.unique(triangles)) == len(matrix)
 
@@ -101,7 +100,7 @@ def test_the_whole_contribution_and_more_values_than_there_are_keep_everything()
 def test_a_vertex_of_several_clusters_is_decoded_from_the_first() -> None:
     matrix = some_matrix(3)
     pca = compressed(matrix, values=3)
-    found = decoded_rows(decoder_of_pca(pca, len(matrix)), np.arange(len(matrix)))
+    found = decoded_rows(tables_of_pca(pca, len(matrix)), np.arange(len(matrix)))
     done = np.zeros(len(matrix), bool)
     shared = 0
     for vertices, weights, vectors in blocks(pca):
@@ -116,7 +115,7 @@ def test_a_vertex_of_several_clusters_is_decoded_from_the_first() -> None:
 @pytest.mark.parametrize("shape", [(5, 64), (64, 5), (8, 8), (1, 9), (9, 1)])
 def test_factors_are_those_of_the_svd(shape: tuple[int, int]) -> None:
     matrix = np.random.default_rng(4).standard_normal(shape).astype(np.float32)
-    left, sigma, right = left_factors(matrix)
+    left, sigma, right = gram_svd(matrix)
     np.testing.assert_allclose(sigma, np.linalg.svd(matrix, compute_uv=False), rtol=1e-4)
     np.testing.assert_allclose((left * sigma) @ right, matrix, atol=1e-4)
     np.testing.assert_allclose(left.T @ left, np.eye(len(sigma)), atol=1e-5)
@@ -130,7 +129,7 @@ def test_equal_rows_and_rows_of_zeros() -> None:
         pca = compressed(matrix.astype(np.float32), values=8)
         np.testing.assert_array_equal(np.diff(pca.first), 1)
         assert (pca.relative_error <= error).all()
-        found = decoded_rows(decoder_of_pca(pca, count), np.arange(count))
+        found = decoded_rows(tables_of_pca(pca, count), np.arange(count))
         np.testing.assert_allclose(found, matrix, atol=1e-5)
 
 

@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from pipelines.ssdf_lighting.compression.compact import (
     MEMORY_STEP,
-    Compact,
-    SharedBasis,
+    CompactCodes,
+    cluster_factors,
     cluster_vectors,
-    coordinates,
-    cosines,
-    factorise,
-    fit,
-    from_cosines,
-    searched,
-    searched_for_bytes,
+    cosine_transform,
+    decoded_coordinates,
+    inverse_cosine_transform,
+    quantise,
+    quantise_to_bytes,
+    quantise_to_rmse,
     shared_vectors,
     sigma_of,
     squared_error,
 )
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes, to_bytes
-from pipelines.ssdf_lighting.compression.compact_memory import packed
-from pipelines.ssdf_lighting.compression.decoding import decoded_rows, decoder_of
+from pipelines.ssdf_lighting.compression.compact_memory import pack
+from pipelines.ssdf_lighting.compression.decoder_tables import decoded_rows, tables_of_packed
+from pipelines.ssdf_lighting.compression.shared_basis import SharedBasis
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
@@ -83,19 +83,19 @@ def scene() -> Given:
     return Given(matrix, cluster, basis_of(matrix, 120))
 
 
-def made(scene: Given, step: float) -> Compact:
-    return fit(scene.basis, scene.cluster, factorise(scene.basis, scene.cluster), step)
+def made(scene: Given, step: float) -> CompactCodes:
+    return quantise(scene.basis, scene.cluster, cluster_factors(scene.basis, scene.cluster), step)
 
 
-def error_in_memory(matrix: Matrix, compact: Compact) -> float:
+def error_in_memory(matrix: Matrix, compact: CompactCodes) -> float:
     """RMSE in radians by solid angle, of all vertices as they are decoded from memory."""
-    found = decoded_rows(decoder_of(packed(compact)), np.arange(len(matrix)))
+    found = decoded_rows(tables_of_packed(pack(compact)), np.arange(len(matrix)))
     weighted = (found.astype(np.float64) - matrix) * root_weights(matrix.shape[1])
     return float(np.sqrt((weighted**2).mean()))
 
 
-def assert_same(one: Compact, other: Compact) -> None:
-    for name, a, b in zip(Compact._fields, one, other, strict=True):
+def assert_same(one: CompactCodes, other: CompactCodes) -> None:
+    for name, a, b in zip(CompactCodes._fields, one, other, strict=True):
         np.testing.assert_array_equal(a, b, err_msg=name)
 
 
@@ -104,9 +104,9 @@ def assert_same(one: Compact, other: Compact) -> None:
 
 def test_cosines_are_orthonormal_and_come_back() -> None:
     rows = np.random.default_rng(0).standard_normal((3, 64))
-    found = cosines(rows)
+    found = cosine_transform(rows)
     assert found.shape == rows.shape
-    np.testing.assert_allclose(from_cosines(found), rows, atol=1e-12)
+    np.testing.assert_allclose(inverse_cosine_transform(found), rows, atol=1e-12)
     np.testing.assert_allclose(found @ found.T, rows @ rows.T, atol=1e-12)
     # By the definition: the first is the mean, the one to its right half a wave along x.
     x = np.tile(np.cos(np.pi * (np.arange(8) + 0.5) / 8), 8)
@@ -115,7 +115,7 @@ def test_cosines_are_orthonormal_and_come_back() -> None:
 
 
 def test_factors_are_the_svd_of_each_cluster_about_its_centre(scene: Given) -> None:
-    factors = factorise(scene.basis, scene.cluster)
+    factors = cluster_factors(scene.basis, scene.cluster)
     assert len(factors) == 6
     for number, one in enumerate(factors):
         rows = scene.basis.coordinates[scene.cluster == number].astype(np.float64)
@@ -139,11 +139,11 @@ def test_what_is_decoded_is_near_what_was_given(scene: Given) -> None:
     off = (vectors - scene.basis.vectors[:, :rank].T) * sigma[:, None]
     assert np.sqrt((off**2).mean()) < step
     centres, _ = cluster_vectors(compact)
-    for number, one in enumerate(factorise(scene.basis, scene.cluster)):
+    for number, one in enumerate(cluster_factors(scene.basis, scene.cluster)):
         size = compact.sizes[number]
         limit = step / math.sqrt(size)
         assert np.abs(centres[number] - one.centre[:rank]).max() < limit
-    missed = coordinates(compact) - scene.basis.coordinates[:, :rank]
+    missed = decoded_coordinates(compact) - scene.basis.coordinates[:, :rank]
     assert np.sqrt((missed.astype(np.float64) ** 2).mean()) < 2 * step
     assert compact.resolution == N
     assert compact.sizes.sum() == len(scene.matrix)
@@ -164,7 +164,7 @@ def test_larger_steps_are_more_error_and_fewer_bytes(scene: Given) -> None:
     tried = [made(scene, step) for step in (0.01, 0.03, 0.1, 0.3, 1.0)]
     errors = [squared_error(scene.basis, one) for one in tried]
     sizes = [len(to_bytes(one)) for one in tried]
-    memory = [packed(one).nbytes for one in tried]
+    memory = [pack(one).nbytes for one in tried]
     assert errors == sorted(errors)
     for counts in (sizes, memory):
         assert counts == sorted(counts, reverse=True)
@@ -197,7 +197,7 @@ def test_rounding_favours_no_sign(scene: Given) -> None:
 
 @pytest.mark.parametrize("rmse", [0.006, 0.02, 0.06, 0.3])
 def test_the_error_asked_for_is_met_and_used_up(scene: Given, rmse: float) -> None:
-    compact = searched(scene.basis, scene.cluster, rmse)
+    compact = quantise_to_rmse(scene.basis, scene.cluster, rmse)
     found = math.sqrt(squared_error(scene.basis, compact) / scene.matrix.size)
     assert found <= rmse
     assert found > 0.95 * rmse
@@ -208,7 +208,7 @@ def test_the_error_asked_for_is_met_and_used_up(scene: Given, rmse: float) -> No
 def test_an_error_just_above_what_the_shared_basis_loses_is_met(scene: Given, above: float) -> None:
     few = basis_of(scene.matrix, 40)
     rmse = above * math.sqrt(few.lost / scene.matrix.size)
-    compact = searched(few, scene.cluster, rmse)
+    compact = quantise_to_rmse(few, scene.cluster, rmse)
     found = math.sqrt(squared_error(few, compact) / scene.matrix.size)
     assert found <= rmse
 
@@ -217,27 +217,27 @@ def test_less_error_than_the_shared_basis_loses_is_refused(scene: Given) -> None
     few = basis_of(scene.matrix, 40)
     rmse = 0.999 * math.sqrt(few.lost / scene.matrix.size)
     with pytest.raises(ValueError, match=r"^the error asked for is .* rad; expected more than the"):
-        searched(few, scene.cluster, rmse)
+        quantise_to_rmse(few, scene.cluster, rmse)
 
 
 @pytest.mark.parametrize("budget", [2500, 8000, 40_000])
 @pytest.mark.parametrize("form", ["file", "memory"])
 def test_the_bytes_asked_for_are_kept_and_used_up(scene: Given, budget: int, form: str) -> None:
-    def count(compact: Compact) -> int:
-        return len(to_bytes(compact)) if form == "file" else packed(compact).nbytes
+    def count(compact: CompactCodes) -> int:
+        return len(to_bytes(compact)) if form == "file" else pack(compact).nbytes
 
     if form == "memory" and budget == 2500:
         budget = 5000
-    compact = searched_for_bytes(scene.basis, scene.cluster, count, budget)
+    compact = quantise_to_bytes(scene.basis, scene.cluster, count, budget)
     assert 0.93 * budget < count(compact) <= budget
 
 
 def test_more_bytes_are_less_error(scene: Given) -> None:
-    def count(compact: Compact) -> int:
+    def count(compact: CompactCodes) -> int:
         return len(to_bytes(compact))
 
     errors = [
-        squared_error(scene.basis, searched_for_bytes(scene.basis, scene.cluster, count, budget))
+        squared_error(scene.basis, quantise_to_bytes(scene.basis, scene.cluster, count, budget))
         for budget in (3000, 6000, 12_000, 24_000)
     ]
     assert errors == sorted(errors, reverse=True)
@@ -246,16 +246,16 @@ def test_more_bytes_are_less_error(scene: Given) -> None:
 
 def test_too_few_bytes_are_refused(scene: Given) -> None:
     with pytest.raises(ValueError, match=r"^10 bytes are out of reach; expected more\.$"):
-        searched_for_bytes(scene.basis, scene.cluster, lambda c: len(to_bytes(c)), 10)
+        quantise_to_bytes(scene.basis, scene.cluster, lambda c: len(to_bytes(c)), 10)
 
 
 # ---- degenerate ------------------------------------------------------------------------------
 
 
-def round_trip(matrix: Matrix, cluster: Ints, step: float, rank: int | None = None) -> Compact:
+def round_trip(matrix: Matrix, cluster: Ints, step: float, rank: int | None = None) -> CompactCodes:
     """Through the file and through memory; both as exact as the step allows."""
     basis = basis_of(matrix, rank)
-    compact = fit(basis, cluster, factorise(basis, cluster), step)
+    compact = quantise(basis, cluster, cluster_factors(basis, cluster), step)
     assert_same(from_bytes(to_bytes(compact)), compact)
     expected = math.sqrt(squared_error(basis, compact) / matrix.size)
     assert error_in_memory(matrix, compact) < 1.1 * expected + MEMORY_STEP * step
@@ -296,7 +296,7 @@ def test_vertices_that_all_see_everything_or_nothing(value: float) -> None:
     for rank in (None, 1):
         compact = round_trip(matrix, cluster, 0.01, rank)
         assert len(compact.shared) == 1
-    found = searched(basis_of(matrix, 1), cluster, 0.01)
+    found = quantise_to_rmse(basis_of(matrix, 1), cluster, 0.01)
     assert error_in_memory(matrix, found) < 0.0105
 
 

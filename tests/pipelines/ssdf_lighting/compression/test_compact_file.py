@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.ssdf_lighting.compression.compact import Compact
+from pipelines.ssdf_lighting.compression.compact import CompactCodes
 from pipelines.ssdf_lighting.compression.compact_file import MAGIC, from_bytes, to_bytes
 
 
@@ -21,7 +21,7 @@ def some_codes(
     clusters: int = 3,
     vertices: int = 40,
     largest: float = 30.0,
-) -> Compact:
+) -> CompactCodes:
     """Codes that need not mean anything, of heavy tails; clusters of any size, also empty."""
     random = np.random.default_rng(seed)
 
@@ -33,7 +33,7 @@ def some_codes(
     ranks = random.integers(0, rank + 1, clusters).astype(np.int32)
     cluster = random.integers(0, clusters, vertices).astype(np.int32)
     sizes = np.bincount(cluster, minlength=clusters)
-    return Compact(
+    return CompactCodes(
         float(random.uniform(1e-4, 1.0)),
         codes(rank, n * n),
         random.integers(0, 90, rank).astype(np.int32),
@@ -46,8 +46,8 @@ def some_codes(
     )
 
 
-def assert_same(one: Compact, other: Compact) -> None:
-    for name, a, b in zip(Compact._fields, one, other, strict=True):
+def assert_same(one: CompactCodes, other: CompactCodes) -> None:
+    for name, a, b in zip(CompactCodes._fields, one, other, strict=True):
         np.testing.assert_array_equal(a, b, err_msg=name)
         assert np.asarray(a).dtype == np.asarray(b).dtype, name
         assert np.shape(a) == np.shape(b), name
@@ -134,7 +134,7 @@ def test_damaged_headers_are_refused_or_read_as_something_whole(place: int) -> N
         assert_whole(found)
 
 
-def assert_whole(found: Compact) -> None:
+def assert_whole(found: CompactCodes) -> None:
     assert 0 < found.step < np.inf
     assert found.resolution >= 4
     rank, total = len(found.shared), len(found.level)

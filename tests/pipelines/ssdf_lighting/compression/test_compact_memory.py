@@ -12,25 +12,25 @@ from numpy.typing import NDArray
 
 from pipelines.ssdf_lighting.compression.compact import (
     MEMORY_STEP,
-    Compact,
-    coordinates,
+    CompactCodes,
+    decoded_coordinates,
     shared_vectors,
     sigma_of,
 )
 from pipelines.ssdf_lighting.compression.compact_memory import (
     cluster_bases,
+    column_bits,
+    pack,
     pack_rows,
-    packed,
     row_bytes,
     unpack_rows,
     vertex_distances,
-    widths,
 )
-from pipelines.ssdf_lighting.compression.decoding import decoded_rows, decoder_of
+from pipelines.ssdf_lighting.compression.decoder_tables import decoded_rows, tables_of_packed
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 
 
-def some_codes(seed: int, *, clusters: int = 4, vertices: int = 50, rank: int = 9) -> Compact:
+def some_codes(seed: int, *, clusters: int = 4, vertices: int = 50, rank: int = 9) -> CompactCodes:
     """Codes as they come: the first columns are the largest; clusters of any size, also empty."""
     random = np.random.default_rng(seed)
     n, step = 8, 0.02
@@ -46,7 +46,7 @@ def some_codes(seed: int, *, clusters: int = 4, vertices: int = 50, rank: int = 
     weights = [
         codes(fading[:kept], size, kept).ravel() for size, kept in zip(sizes, ranks, strict=True)
     ]
-    return Compact(
+    return CompactCodes(
         step,
         codes(20.0, rank, n * n),
         np.sort(random.integers(12, 40, rank).astype(np.int32))[::-1].copy(),
@@ -74,7 +74,7 @@ def tables(draw: st.DrawFn) -> NDArray[np.int32]:
 @given(tables())
 @settings(max_examples=200, deadline=None)
 def test_rows_come_back(codes: NDArray[np.int32]) -> None:
-    bits = widths(codes)
+    bits = column_bits(codes)
     assert set(bits.tolist()) <= {4, 8, 16, 32}
     rows = pack_rows(codes, bits)
     assert rows.dtype == np.uint8
@@ -85,7 +85,7 @@ def test_rows_come_back(codes: NDArray[np.int32]) -> None:
 @given(tables())
 @settings(max_examples=100, deadline=None)
 def test_widths_are_the_least(codes: NDArray[np.int32]) -> None:
-    for column, bits in zip(codes.T.astype(np.int64), widths(codes), strict=True):
+    for column, bits in zip(codes.T.astype(np.int64), column_bits(codes), strict=True):
         fits = [
             b for b in (4, 8, 16, 32) if ((column >= -(1 << b - 1)) & (column < 1 << b - 1)).all()
         ]
@@ -106,8 +106,8 @@ def test_a_row_is_laid_out_as_described() -> None:
 def test_all_vertices_are_decoded_as_the_codes_say(seed: int) -> None:
     """The shared basis is rounded once more: to half a step over sigma."""
     compact = some_codes(seed)
-    found = decoded_rows(decoder_of(packed(compact)), np.arange(50))
-    coordinate = coordinates(compact).astype(np.float64)
+    found = decoded_rows(tables_of_packed(pack(compact)), np.arange(50))
+    coordinate = decoded_coordinates(compact).astype(np.float64)
     exact = coordinate @ shared_vectors(compact) / root_weights(64)
     slack = MEMORY_STEP * compact.step / 2 / sigma_of(compact.shared_level, compact.step)
     limit = (np.abs(coordinate) @ slack)[:, None] / root_weights(64)
@@ -121,9 +121,9 @@ def test_all_vertices_are_decoded_as_the_codes_say(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_one_vertex_is_decoded_as_all_are(seed: int) -> None:
     compact = some_codes(seed)
-    memory = packed(compact)
+    memory = pack(compact)
     bases = cluster_bases(memory)
-    together = decoded_rows(decoder_of(memory), np.arange(50))
+    together = decoded_rows(tables_of_packed(memory), np.arange(50))
     for vertex in range(50):
         alone = vertex_distances(memory, bases, vertex)
         assert alone.dtype == np.float32
@@ -132,7 +132,7 @@ def test_one_vertex_is_decoded_as_all_are(seed: int) -> None:
 
 @pytest.mark.parametrize("clusters", [1, 4, 300])
 def test_numbers_of_clusters_and_places_take_no_more_than_they_need(clusters: int) -> None:
-    memory = packed(some_codes(0, clusters=clusters, vertices=700))
+    memory = pack(some_codes(0, clusters=clusters, vertices=700))
     assert memory.cluster.itemsize == (1 if clusters <= 256 else 2)
     assert memory.nbytes == sum(part.nbytes for part in memory)
     sizes = np.bincount(memory.cluster, minlength=clusters)
@@ -149,8 +149,8 @@ def test_without_any_vectors_the_centres_are_left() -> None:
         ranks=np.zeros_like(compact.ranks),
         weights=compact.weights[:0],
     )
-    memory = packed(bare)
+    memory = pack(bare)
     bases = cluster_bases(memory)
-    found = decoded_rows(decoder_of(memory), np.arange(50))
+    found = decoded_rows(tables_of_packed(memory), np.arange(50))
     np.testing.assert_allclose(found, bases.centres[bare.cluster], rtol=1e-5)
     np.testing.assert_allclose(vertex_distances(memory, bases, 7), found[7], rtol=1e-5)

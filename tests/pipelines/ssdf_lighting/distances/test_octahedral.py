@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipelines.ssdf_lighting.distances.octahedral import (
+    bilinear_taps,
     delaunay_triangles,
     directions_of,
     resolution_of,
     solid_angles,
     square_of,
-    taps,
     texel_directions,
 )
 
@@ -240,7 +240,7 @@ def test_weights_are_shares_of_four_near_texels(x: float, y: float, z: float, n:
     vector = np.array([x, y, z])
     assume(np.abs(vector).max() > 1e-3)
     vector /= np.linalg.norm(vector)
-    found = taps(vector, n)
+    found = bilinear_taps(vector, n)
     assert found.texels.shape == found.weights.shape == (4,)
     assert found.weights.sum() == pytest.approx(1, abs=1e-12)
     assert (found.weights >= -1e-12).all()
@@ -253,7 +253,7 @@ def test_weights_are_shares_of_four_near_texels(x: float, y: float, z: float, n:
 
 @pytest.mark.parametrize("n", RESOLUTIONS)
 def test_middles_of_texels_are_read_exactly(n: int) -> None:
-    found = taps(texel_directions(n), n)
+    found = bilinear_taps(texel_directions(n), n)
     values = np.random.default_rng(n).standard_normal(n * n)
     np.testing.assert_allclose(
         (values[found.texels] * found.weights).sum(axis=1), values, atol=1e-11
@@ -268,7 +268,7 @@ def test_what_is_read_is_continuous_all_over_the_sphere(n: int) -> None:
     values = rng.standard_normal(n * n)
 
     def read(directions: Floats) -> Floats:
-        found = taps(directions, n)
+        found = bilinear_taps(directions, n)
         return (values[found.texels] * found.weights).sum(axis=-1)
 
     on_lines = rng.uniform(-1, 1, (3000, 3))
@@ -300,7 +300,7 @@ def test_a_smooth_function_is_read_with_an_error_that_falls_by_four() -> None:
 
     errors = []
     for n in (16, 32, 64):
-        found = taps(directions, n)
+        found = bilinear_taps(directions, n)
         read = (smooth(texel_directions(n))[found.texels] * found.weights).sum(axis=1)
         errors.append(float(np.sqrt(((read - smooth(directions)) ** 2).mean())))
     # The map has kinks along the octahedron's edges, on a share of 1 / n of the sphere.

@@ -10,13 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.distances.signed_distance import (
+from pipelines.ssdf_lighting.distances.octahedral import (
     NO_EDGE,
+    delaunay_sides,
+    solid_angles,
+    texel_directions,
+)
+from pipelines.ssdf_lighting.distances.signed_distance import (
     distances_to_arcs,
     distances_to_samples,
 )
-from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, delaunay_sides
+from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.distances.visibility import (
     RayOrigins,
     ray_origins,
-    stand_ins,
+    stand_ins_for_buried,
     visible_directions,
 )
 from pipelines.ssdf_lighting.light.microfacets import Materials
@@ -63,7 +63,7 @@ def look_around(scene: Scene) -> Seen:
     around = scene.vertices, scene.triangles, scene.normals
     origins = ray_origins(rays, *around)
     visible = visible_directions(rays, origins, WAYS)
-    stored = stand_ins(rays, *around, origins, visible.mean(axis=1), WAYS)
+    stored = stand_ins_for_buried(rays, *around, origins, visible.mean(axis=1), WAYS)
     places = scene.vertices * scene.scale + scene.middle
     return Seen(scene, places, origins, visible, stored)
 
@@ -376,5 +376,5 @@ def test_where_all_or_none_are_buried_each_keeps_its_own() -> None:
     for sealed in (np.zeros(count, bool), np.ones(count, bool)):
         given = RayOrigins(origins.points, sealed)
         share = np.where(sealed, 0.0, 0.5)
-        found = stand_ins(rays, *around, given, share, WAYS)
+        found = stand_ins_for_buried(rays, *around, given, share, WAYS)
         np.testing.assert_array_equal(found, np.arange(count))

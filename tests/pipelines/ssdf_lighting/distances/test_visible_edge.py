@@ -9,14 +9,17 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.geometry.rays import build_scene, occluded
-from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
+from pipelines.ssdf_lighting.distances.octahedral import (
+    delaunay_sides,
+    solid_angles,
+    texel_directions,
+)
 from pipelines.ssdf_lighting.distances.signed_distance import (
     distances_to_arcs,
     distances_to_samples,
 )
 from pipelines.ssdf_lighting.distances.visible_edge import (
     VisibleEdge,
-    delaunay_sides,
     visible_edge,
 )
 

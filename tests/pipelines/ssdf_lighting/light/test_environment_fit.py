@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.light.built_in_environments import lamps, sky, uniform
 from pipelines.light.environment_maps import rotate_environment, solid_angles, texel_directions
-from pipelines.ssdf_lighting.light.environment_fit import Fit, averaged, blurred, fit_lights
+from pipelines.ssdf_lighting.light.environment_fit import Fit, blurred, downsampled, fit_lights
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate, integral
 
 
@@ -48,8 +48,8 @@ def clear_fit(clear: NDArray[np.float32]) -> Fit:
 @pytest.mark.parametrize("height", [1, 5, 64, 96, 128])
 def test_averaging_keeps_the_flux_and_even_light(height: int) -> None:
     light = np.random.default_rng(height).random((height, 2 * height, 3)).astype(np.float32)
-    np.testing.assert_allclose(flux_of_map(averaged(light, 64)), flux_of_map(light), rtol=1e-12)
-    np.testing.assert_allclose(averaged(uniform(height), 64), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(flux_of_map(downsampled(light, 64)), flux_of_map(light), rtol=1e-12)
+    np.testing.assert_allclose(downsampled(uniform(height), 64), 1.0, rtol=1e-12)
 
 
 def test_averaging_by_a_whole_number_is_a_weighted_mean() -> None:
@@ -57,9 +57,9 @@ def test_averaging_by_a_whole_number_is_a_weighted_mean() -> None:
     weights = np.broadcast_to(solid_angles(12)[:, None, None], (12, 24, 1))
     sums = (light * weights).reshape(4, 3, 8, 3, 3).sum(axis=(1, 3))
     expected = sums / weights.reshape(4, 3, 8, 3, 1).sum(axis=(1, 3))
-    np.testing.assert_allclose(averaged(light, 4), expected, rtol=1e-12)
+    np.testing.assert_allclose(downsampled(light, 4), expected, rtol=1e-12)
     with pytest.raises(ValueError, match=r"^height is 0; expected 1 or more\.$"):
-        averaged(light, 0)
+        downsampled(light, 0)
 
 
 def test_blurring_is_a_mean_over_the_surroundings() -> None:
@@ -116,7 +116,7 @@ def test_a_clear_sky_has_its_sun_and_its_dome(clear: NDArray[np.float32], clear_
     np.testing.assert_allclose(power, flux_of_map(bright), rtol=0.05)
 
     ways = texel_directions(64)
-    dome, found = averaged(clear, 64), evaluate(lights, ways)
+    dome, found = downsampled(clear, 64), evaluate(lights, ways)
     away = ways @ towards(40.0, 35.0) < math.cos(math.radians(12.0))
     away &= np.abs(ways[..., 2]) > 0.15  # the horizon is an edge
     ratio = (found / dome)[away]

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
 from pipelines.ssdf_lighting.distances.edge_share import edge_share
-from pipelines.ssdf_lighting.drawing.camera_rays import eye, views
+from pipelines.ssdf_lighting.drawing.camera_rays import eye, view_vectors
 from pipelines.ssdf_lighting.light.lobe_axes import AxisTables, lobe_axes
 from pipelines.ssdf_lighting.light.microfacets import fresnel, gloss, smith
 from pipelines.ssdf_lighting.light.shading import Lobes, Materials, lobe_tables, lobes, shaded
 from pipelines.ssdf_lighting.light.spherical_gaussians import (
     Lights,
     integral,
-    looked_up,
     visible_integral,
+    visible_share,
     visible_table,
 )
 
@@ -215,7 +215,9 @@ def test_axes_at_vertices_are_those_of_the_lobes() -> None:
             AxisTables(tables, materials.specular > 0),
             lights,
         )
-        exact = lobes(normals, views(camera, points), material, materials, lights, tables=tables)
+        exact = lobes(
+            normals, view_vectors(camera, points), material, materials, lights, tables=tables
+        )
         np.testing.assert_allclose(fast, exact.axes, atol=1e-4)
 
 
@@ -225,7 +227,7 @@ def test_the_formula_of_the_share_is_near_the_integral() -> None:
     error = np.abs(edge_share(d, sharpness) - visible_integral(d, sharpness) / integral(sharpness))
     assert error.max() < 0.004
     assert error[:, np.abs(d) <= np.pi / 2].max() < 0.0018
-    assert np.abs(edge_share(d, 8.0) - looked_up(TABLE, d, 8.0)).max() < 0.003
+    assert np.abs(edge_share(d, 8.0) - visible_share(TABLE, d, 8.0)).max() < 0.003
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,10 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import (
     VisibleTable,
     evaluate,
     integral,
-    looked_up,
     product,
     rotated,
     visible_integral,
+    visible_share,
     visible_table,
 )
 
@@ -261,22 +261,22 @@ def test_the_table_is_accurate_for_all_sharpnesses(rows: int, columns: int, boun
     even = np.broadcast_to(np.linspace(-math.pi, math.pi, 601)[:, None], (601, 240))
     distance = np.concatenate([even, widths])
     expected = visible_integral(distance, sharp) / integral(sharp)
-    assert np.abs(looked_up(made, distance, sharp) - expected).max() < bound
+    assert np.abs(visible_share(made, distance, sharp) - expected).max() < bound
 
 
 def test_the_tables_ends_are_exact(table: VisibleTable) -> None:
-    np.testing.assert_array_equal(looked_up(table, 0.0, SHARP), 0.5)
-    np.testing.assert_array_equal(looked_up(table, math.pi, SHARP), 1.0)
-    np.testing.assert_array_equal(looked_up(table, -9.0, SHARP), 0.0)
-    assert float(looked_up(table, -math.pi, 0.0)) == 0.0
+    np.testing.assert_array_equal(visible_share(table, 0.0, SHARP), 0.5)
+    np.testing.assert_array_equal(visible_share(table, math.pi, SHARP), 1.0)
+    np.testing.assert_array_equal(visible_share(table, -9.0, SHARP), 0.0)
+    assert float(visible_share(table, -math.pi, 0.0)) == 0.0
     middle = (1 - math.cos(2.5)) / 2  # a cap's part of the sphere
-    assert float(looked_up(table, 2.5, 0.0)) == pytest.approx(middle, abs=1e-3)
+    assert float(visible_share(table, 2.5, 0.0)) == pytest.approx(middle, abs=1e-3)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(0.0, 1e12))
 @settings(max_examples=200, deadline=None)
 def test_no_look_up_leaves_the_table(distance: float, sharpness: float) -> None:
-    share = float(looked_up(_SMALL, distance, sharpness))
+    share = float(visible_share(_SMALL, distance, sharpness))
     assert 0.0 <= share <= 1.0
     assert (share >= 0.5) == (distance >= 0) or share == 0.5
 
