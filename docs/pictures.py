@@ -20,7 +20,7 @@ from assets_defs.street_billboards.textures import TextureSettings, view_texture
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from pipelines.drawing.colour import to_8bit
-from pipelines.ssdf_lighting.drawing.pictures import curve_picture
+from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.drawing.frames import StreetStage
 from pipelines.street_billboards.textures import eigen_textures
@@ -89,7 +89,8 @@ def _lighting(store: VersionedStore) -> None:
             FOLDER / name, optimize=True
         )
     result = json.loads((Path("benchmarks") / "results" / "ssdf.json").read_text())
-    Image.fromarray(curve_picture(result["curve"])).save(FOLDER / "ssdf-curve.png", optimize=True)
+    curve = Image.fromarray(rate_distortion_picture(result["curve"]))
+    curve.save(FOLDER / "ssdf-curve.png", optimize=True)
 
 
 def _street(store: VersionedStore) -> None:
@@ -133,7 +134,7 @@ def _pole(store: VersionedStore) -> list[NDArray[np.uint8]]:
         sky = stored("depth_maps")["sky"].values
         with StreetStage(made, packed, sky, size, supersampling=2) as stage:
             view = stage.view(drive["intrinsics"].values[1], pose)
-        pictures.append(figures.evened(to_8bit(view.with_sky), truth, view.covered > 0.5))
+        pictures.append(figures.match_exposure(to_8bit(view.with_sky), truth, view.covered > 0.5))
     left = min(max(middle - size[0] // 5, 0), size[0] - 2 * size[0] // 5)
     return [picture[:, left : left + 2 * size[0] // 5] for picture in pictures]
 
