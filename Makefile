@@ -28,8 +28,8 @@ test: setup      ## all tests but the paper-size ones
 test-slow: setup ## the paper-size tests
 	@$(VENV)/python -m pytest -q -n 0 -m slow
 
-ui: setup        ## the Dagster web UI on http://127.0.0.1:3000
-	@set -a && . ./.env && $(VENV)/dagster dev -w workspace.yaml -h 127.0.0.1 -p 3000
+ui: setup        ## the Dagster web UI at a free port from 3000 on
+	@exec $(VENV)/tsuya ui
 
 bench: setup     ## a benchmark: make bench NAME=btf
 	@$(VENV)/python -m benchmarks $(NAME)

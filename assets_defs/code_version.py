@@ -16,13 +16,14 @@ import ast
 import atexit
 import functools
 import hashlib
+import importlib
 import inspect
 import json
 import os
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -50,6 +51,8 @@ class Code(NamedTuple):
     """Names that stand in it; of a whole file: none."""
     reaches: tuple[str, ...]
     """Modules of the hashed packages that it imports, and shaders that it names."""
+    from_assets: tuple[str, ...]
+    """``module:name`` of what it imports from modules of assets."""
 
 
 def code_version(*functions: Callable[..., Any]) -> str:
@@ -73,13 +76,21 @@ def _gather(function: Callable[..., Any], own: dict[str, str], modules: set[str]
     own[name] = code.digest
     for module in code.reaches:
         modules |= _reached(module)
-    for word in code.names:
-        value = function.__globals__.get(word)
+    named = {word: function.__globals__.get(word) for word in code.names}
+    for imported in code.from_assets:
+        module, _, word = imported.partition(":")
+        if _is_near(module, function.__module__):
+            named[word] = getattr(importlib.import_module(module), word, None)
+    for word, value in named.items():
         home = getattr(value, "__name__" if inspect.ismodule(value) else "__module__", None)
         if isinstance(home, str) and home.startswith(_HASHED_PACKAGES):
             modules |= _reached(home)
         elif inspect.isfunction(value) and _is_near(home, function.__module__):
             _gather(value, own, modules)
+        elif inspect.ismodule(value) and _is_near(home, function.__module__):
+            whole = _module(value.__name__)
+            own[value.__name__] = whole.digest
+            modules.update(*(_reached(module) for module in whole.reaches))
         elif _is_constant(value):
             own[f"{function.__module__}.{word}"] = repr(value)
 
@@ -143,7 +154,7 @@ def _file(path: Path) -> dict[str, Code]:
 
 def _codes(tree: ast.Module) -> dict[str, Code]:
     functions = {node.name: _code(node) for node in tree.body if isinstance(node, ast.FunctionDef)}
-    return {"": _code(tree)._replace(names=()), **functions}
+    return {"": _code(tree)._replace(names=(), from_assets=()), **functions}
 
 
 def _code(tree: ast.AST) -> Code:
@@ -152,14 +163,21 @@ def _code(tree: ast.AST) -> Code:
     names = dict.fromkeys(node.id for node in nodes if isinstance(node, ast.Name))
     texts = [str(node.value) for node in nodes if isinstance(node, ast.Constant)]
     shaders = [text for text in texts if _is_shader(text)]
-    return Code(digest, tuple(names), tuple(dict.fromkeys([*_imports(tree), *shaders])))
+    reaches = tuple(dict.fromkeys([*_imports(tree), *shaders]))
+    from_assets = (
+        f"{node.module}:{alias.name}"
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("assets_defs.")
+        for alias in node.names
+    )
+    return Code(digest, tuple(names), reaches, tuple(from_assets))
 
 
 def _shader(text: str) -> Code:
     plain = _COMMENT.sub("", text)
     lines = "\n".join(line.strip() for line in plain.splitlines() if line.strip())
     includes = [name for name in _INCLUDE.findall(plain) if _is_shader(name)]
-    return Code(hashlib.sha256(lines.encode()).hexdigest(), (), tuple(includes))
+    return Code(hashlib.sha256(lines.encode()).hexdigest(), (), tuple(includes), ())
 
 
 def _is_shader(text: str) -> bool:
@@ -180,7 +198,7 @@ def _imports(tree: ast.AST) -> Iterator[str]:
 
 
 def _path(name: str) -> Path | None:
-    if name.endswith(".glsl"):
+    if _is_shader(name):
         return SHADERS / name
     base = PROJECT.joinpath(*name.split("."))
     for path in (base.with_suffix(".py"), base / "__init__.py"):
@@ -210,11 +228,16 @@ def _kept() -> dict[str, tuple[str, dict[str, Code]]]:
     """What earlier processes worked out, by path: the file's hash and its codes."""
     try:
         return {
-            path: (digest, {name: Code(d, tuple(n), tuple(r)) for name, (d, n, r) in codes.items()})
+            path: (digest, {name: _read(code) for name, code in codes.items()})
             for path, (digest, codes) in json.loads(_KEPT.read_text()).items()
         }
     except (OSError, ValueError, TypeError, AttributeError):
         return {}  # none yet, or not ours: all of it can be worked out again
+
+
+def _read(code: Sequence[Any]) -> Code:
+    digest, *lists = code
+    return Code(digest, *(tuple(words) for words in lists))
 
 
 @functools.cache

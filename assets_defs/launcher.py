@@ -75,12 +75,17 @@ class Launcher:
     job: JobByName
     progress: LaunchProgress
 
-    def launch(self, request: Request) -> list[Outcome]:
+    def launch(
+        self,
+        request: Request,
+        show: Callable[[Sequence[Outcome]], None] = lambda outcomes: None,
+    ) -> list[Outcome]:
         """Run what is not current. Raises SettingsError, ValueError before any work; LaunchError.
 
         An interruption (Ctrl-C) ends the run at work and the launch: KeyboardInterrupt.
         Every source is read and every setting is checked before the first run starts. Where a run
-        fails, what is made from it is left out, and the rest goes on.
+        fails, what is made from it is left out, and the rest goes on. ``show`` is told what there
+        is of each partition of a grain as soon as it is there.
         """
         planned = self._plan(request)
         for dimension in request.system.dimensions:
@@ -94,10 +99,13 @@ class Launcher:
             if any(broken.items() <= keys.items() for broken in failed):
                 continue
             try:
-                outcomes += self._run_grain(request, by, keys)
+                found = self._run_grain(request, by, keys)
             except _RunError as error:
                 failures.append(f"{request.system.name} [{', '.join(keys.values())}]: {error}")
                 failed.append(keys)
+                continue
+            outcomes += found
+            show(found)
         self.progress(request.system.name, 1.0)
         if failures:
             raise LaunchError(failures, outcomes)

@@ -22,6 +22,14 @@ class Workspace:
         """The workspace of this process's environment."""
         return cls(Path(os.environ.get("TSUYA_DATA") or CHECKOUT / "data"))
 
+    @classmethod
+    def of_checkout(cls) -> Workspace:
+        """The workspace that ``.env`` names where the environment does not: the command line's."""
+        from dotenv import load_dotenv
+
+        load_dotenv(CHECKOUT / ".env")
+        return cls.from_environment()
+
     @property
     def store(self) -> VersionedStore:
         """All versions of all assets."""

@@ -7,16 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from assets_defs.systems import SYSTEMS
+from assets_defs.workspace import CHECKOUT
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+PICTURES = CHECKOUT / "pictures"
 _MILLISECONDS_A_FRAME = 250
 
 
-def write_gallery(store: VersionedStore, slots: Sequence[Slot], folder: Path) -> list[Path]:
+def write_pictures(store: VersionedStore, slots: Sequence[Slot], folder: Path) -> list[Path]:
     """Write the pictures of the current versions: PNG, moving ones as WebP; returns their paths."""
     written = []
     for slot in slots:
@@ -26,6 +28,12 @@ def write_gallery(store: VersionedStore, slots: Sequence[Slot], folder: Path) ->
         for name, picture in pictures(store.open(slot)).items():
             path = folder / slot.system / f"{slot.asset}-{slot.partition}-{name}"
             written.append(_write(picture, path))
+    return written
+
+
+def write_overviews(store: VersionedStore, slots: Sequence[Slot], folder: Path) -> list[Path]:
+    """Write the pictures that show several partitions of a system; returns their paths."""
+    written = []
     for system in SYSTEMS.values():
         own = [slot for slot in slots if slot.system == system.name]
         if system.overview is not None and own:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from assets_defs.launcher import Outcome
-from assets_defs.systems import SYSTEMS
 from storage.versions import Slot, VersionedStore
 from storage.zarr_files import stored_bytes
+
+if TYPE_CHECKING:
+    from assets_defs.launcher import Outcome
+    from assets_defs.system import System
 
 
 def slot_report(store: VersionedStore, slot: Slot) -> dict[str, Any]:
@@ -52,7 +54,7 @@ def outcome_reports(store: VersionedStore, outcomes: Sequence[Outcome]) -> list[
     ]
 
 
-def figures_table(reports: Sequence[dict[str, Any]]) -> Table:
+def figures_table(systems: Iterable[System], reports: Sequence[dict[str, Any]]) -> Table:
     """One row a check: on how many partitions, between which figures, within which bounds."""
     table = Table(title="Figures of the checks", title_justify="left")
     for name, justify in (
@@ -60,7 +62,7 @@ def figures_table(reports: Sequence[dict[str, Any]]) -> Table:
         ("most", "right"), ("bounds", "left"),
     ):  # fmt: skip
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
-    for system in SYSTEMS.values():
+    for system in systems:
         for plan in system.plans.values():
             found = [report for report in reports if _is_of(report, system.name, plan.name)]
             for check in plan.checks:
@@ -76,7 +78,7 @@ def figures_table(reports: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def sizes_table(reports: Sequence[dict[str, Any]]) -> Table:
+def sizes_table(systems: Iterable[System], reports: Sequence[dict[str, Any]]) -> Table:
     """One row an asset: how many partitions were made, seconds, bytes."""
     table = Table(title="Assets", title_justify="left")
     for name, justify in (
@@ -84,7 +86,7 @@ def sizes_table(reports: Sequence[dict[str, Any]]) -> Table:
         ("kB stored", "right"),
     ):  # fmt: skip
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
-    for system in SYSTEMS.values():
+    for system in systems:
         for plan in system.plans.values():
             found = [report for report in reports if _is_of(report, system.name, plan.name)]
             if found:
@@ -118,18 +120,3 @@ def status_table(reports: Sequence[dict[str, Any]]) -> Table:
             str(len(report["rejected"]) or ""),
         )
     return table
-
-
-def parse_key(key: str) -> Slot:
-    """A slot from ``system/asset/partition``; keys of a partition are joined by ``.`` or ``|``.
-
-    Raises ValueError.
-    """
-    parts = key.strip("/").split("/")
-    if len(parts) != 3 or parts[0] not in SYSTEMS or parts[1] not in SYSTEMS[parts[0]].plans:
-        known = [f"{name}/{asset}" for name, system in SYSTEMS.items() for asset in system.plans]
-        raise ValueError(
-            f"key is {key!r}; expected system/asset/partition with one of {', '.join(known)}."
-        )
-    system, asset, partition = parts
-    return Slot(system, asset, partition.replace("|", "."))

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import click
 import dagster as dg
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from assets_defs.definitions import build_definitions
-from assets_defs.launcher import Launcher
+from assets_defs.launcher import Launcher, LaunchError, Outcome, Request
+from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import CHECKOUT, Workspace
-
-
-class SetUpError(Exception):
-    """The checkout is not set up."""
+from tsuya.console import SetUpError, fail, output
+from tsuya.report import figures_table, outcome_reports, sizes_table
 
 
 @dataclass(frozen=True)
@@ -27,24 +30,68 @@ class Session:
     workspace: Workspace
     instance: dg.DagsterInstance
     launcher: Launcher
+    say: Callable[[str], None]
+    """Print a line on standard output while progress is shown."""
 
 
 @contextmanager
-def open_session(console: Console) -> Iterator[Session]:
-    """Open the instance that the web UI shows; progress goes to the console.
+def open_session() -> Iterator[Session]:
+    """Open the instance that the web UI shows; progress goes to standard error.
 
     Raises SetUpError where ``make setup`` has not been run.
     """
-    from dotenv import load_dotenv
-
-    load_dotenv(CHECKOUT / ".env")
+    workspace = Workspace.of_checkout()
     if not os.environ.get("DAGSTER_HOME"):
         raise SetUpError(f"{CHECKOUT}: DAGSTER_HOME is not set; expected `make setup` to be run.")
-    workspace = Workspace.from_environment()
-    with Display(console) as display, dg.DagsterInstance.get() as instance:
+    with Display(Console(stderr=True)) as display, dg.DagsterInstance.get() as instance:
         definitions = build_definitions(workspace, {"progress": display})
         job = definitions.get_repository_def().get_job
-        yield Session(workspace, instance, Launcher(instance, workspace, job, display))
+        yield Session(workspace, instance, Launcher(instance, workspace, job, display), display.say)
+
+
+class Launched(NamedTuple):
+    """What several launches came to."""
+
+    outcomes: list[Outcome]
+    failures: list[str]
+    seconds: float
+
+
+def launch_all(
+    session: Session,
+    requests: Sequence[Request],
+    show: Callable[[Sequence[Outcome]], None] = lambda outcomes: None,
+) -> Launched:
+    """Launch one after the other; a failure ends none of the others.
+
+    ``show`` is told what there is of each partition as soon as it is there.
+    """
+    started = time.perf_counter()
+    outcomes: list[Outcome] = []
+    failures: list[str] = []
+    for request in requests:
+        try:
+            outcomes += session.launcher.launch(request, show)
+        except LaunchError as error:
+            outcomes += error.outcomes
+            failures.append(str(error))
+    return Launched(outcomes, failures, time.perf_counter() - started)
+
+
+def report(session: Session, launched: Launched, as_json: bool) -> None:
+    """Print what became of the launches; exit with 1 where something failed."""
+    reports = outcome_reports(session.workspace.store, launched.outcomes)
+    if as_json:
+        summary = {"seconds": round(launched.seconds, 3), "failures": launched.failures}
+        click.echo(json.dumps(summary | {"assets": reports}))
+    else:
+        systems = SYSTEMS.values()
+        output().print(sizes_table(systems, reports), figures_table(systems, reports))
+        made = sum(1 for outcome in launched.outcomes if outcome.state == "made")
+        current = len(reports) - made
+        click.echo(f"{made} made, {current} current already, {launched.seconds:.1f} s.")
+    if launched.failures:
+        fail("\n".join(launched.failures), 1)
 
 
 class Display:
@@ -73,6 +120,12 @@ class Display:
 
     def __exit__(self, *error: object) -> None:
         self._bars.stop()
+
+    def say(self, line: str) -> None:
+        """Print a line on standard output, above the bars."""
+        self._bars.stop()
+        click.echo(line)
+        self._bars.start()
 
     def __call__(self, what: str, fraction: float) -> None:
         """Show a fraction: of a system (no brackets in its name) or of one of its assets."""

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import pkgutil
 
 from storage.schemas.schema import Schema, Variable
 
-__all__ = ["Schema", "Variable", "find_schema", "schemas_of"]
+__all__ = ["Schema", "Variable", "find_schema", "schemas_of", "systems"]
+
+
+def systems() -> tuple[str, ...]:
+    """Names of all systems, in the order of the alphabet.
+
+    >>> systems()[:2]
+    ('glass_scratches', 'neural_btf')
+    """
+    names = (module.name for module in pkgutil.iter_modules(__path__))
+    return tuple(sorted(name for name in names if name != "schema"))
 
 
 def schemas_of(system: str) -> tuple[Schema, ...]:

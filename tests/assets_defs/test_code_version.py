@@ -54,9 +54,14 @@ def figure(height: float) -> float:
 ''',
     "assets_defs/street/points.py": (
         "from assets_defs.pictures import table\n"
+        "from assets_defs.street import whole\n"
         "from assets_defs.street.datasets import cloud\n\n\n"
-        "def points() -> int:\n    return cloud() + table()\n"
+        "def points() -> int:\n"
+        "    from assets_defs.street.late import inside\n\n"
+        "    return cloud() + table() + whole.total() + inside()\n"
     ),
+    "assets_defs/street/late.py": "def inside() -> int:\n    return 11\n",
+    "assets_defs/street/whole.py": "def total() -> int:\n    return 12\n",
     "assets_defs/street/datasets.py": "def cloud() -> int:\n    return 6\n",
     "assets_defs/pictures.py": "def table() -> int:\n    return 9\n",
     "pipelines/medium.py": '''"""The medium."""
@@ -98,6 +103,11 @@ def decay(height: float) -> float:
         "from storage.readers.files import suffix\n\n\n"
         "def finish(total: float, medium: object) -> float:\n    return total + suffix()\n"
     ),
+    "pipelines/drawn.py": 'def draw() -> str:\n    return "outer.glsl"\n',
+    "pipelines/drawing/shaders/outer.glsl": (
+        '#include "inner.glsl"\nfloat outer() { return 2.0 * inner(); }\n'
+    ),
+    "pipelines/drawing/shaders/inner.glsl": "// Half.\nfloat inner() { return 0.5; }\n",
     "pipelines/stranger.py": "def strange() -> int:\n    return 5\n",
     "storage/readers/files.py": "def suffix() -> int:\n    return 4\n",
     "storage/schemas.py": "FUR = 1\n",
@@ -112,6 +122,7 @@ def version(tmp_path: Path) -> Version:
     """Code version of the small project's `stack` with replacements (file, old, new) made."""
     for package in (
         *("assets_defs", "assets_defs/street", "pipelines", "pipelines/deep"),
+        *("pipelines/drawing", "pipelines/drawing/shaders"),
         *("storage", "storage/readers"),
     ):
         (tmp_path / package).mkdir()
@@ -187,10 +198,25 @@ def test_every_change_of_what_is_computed_is_another_version(version: Version) -
 def test_functions_of_the_systems_own_package_count_and_others_do_not(version: Version) -> None:
     script = "from assets_defs.street.points import points\nprint(code_version(points))"
     before = version(script=script)
-    near = ("assets_defs/street/datasets.py", "6", "7")
+    near = {
+        "imported by name": ("assets_defs/street/datasets.py", "6", "7"),
+        "imported when it runs": ("assets_defs/street/late.py", "11", "13"),
+        "imported as a module": ("assets_defs/street/whole.py", "12", "13"),
+    }
     far = ("assets_defs/pictures.py", "9", "10")
-    assert version(near, script=script) != before
+    versions = [before, *(version(change, script=script) for change in near.values())]
+    assert len(set(versions)) == len(versions)
     assert version(far, script=script) == before
+
+
+def test_shaders_count_and_their_comments_do_not(version: Version) -> None:
+    script = "from pipelines.drawn import draw\nprint(code_version(draw))"
+    before = version(script=script)
+    comment = ("pipelines/drawing/shaders/inner.glsl", "// Half.", "// A half.")
+    inner = ("pipelines/drawing/shaders/inner.glsl", "0.5", "0.25")
+    outer = ("pipelines/drawing/shaders/outer.glsl", "2.0", "3.0")
+    assert version(comment, script=script) == before
+    assert len({before, version(inner, script=script), version(outer, script=script)}) == 3
 
 
 def test_a_version_does_not_depend_on_what_was_asked_before(version: Version) -> None:

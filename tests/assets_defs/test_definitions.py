@@ -23,7 +23,9 @@ from assets_defs.neural_btf.graph import BTF
 from assets_defs.photo_fur.graph import FUR
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.graph import STREET
-from assets_defs.system import Source, System, partition_key
+from assets_defs.provenance import partition_key
+from assets_defs.sources import Source
+from assets_defs.system import System
 from assets_defs.systems import SYSTEMS
 from storage.schemas import schemas_of
 from storage.versions import Slot

@@ -21,7 +21,7 @@ from PIL import Image
 from assets_defs.workspace import Workspace
 from storage.zarr_files import open_dataset
 from tsuya.cli import main
-from tsuya.gallery import write_gallery
+from tsuya.gallery import write_pictures
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +221,7 @@ def test_the_gallery_writes_a_png_for_every_picture(
 ) -> None:
     store = Workspace(home / "data").store
     slots = [slot for slot in store.slots() if slot.partition in ("grass", "square.grass")]
-    names = {path.name for path in write_gallery(store, slots, tmp_path)}
+    names = {path.name for path in write_pictures(store, slots, tmp_path)}
     assert names == {
         "fur_photo-grass-photograph.png",
         "attenuation-grass-decay.png",
@@ -235,7 +235,7 @@ def test_the_gallery_writes_a_png_for_every_picture(
 def test_the_doctor_finds_this_machine_well_and_draws(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tsuya.cli.PICTURES", tmp_path)
+    monkeypatch.setattr("tsuya.gallery.PICTURES", tmp_path)
     result = tsuya("doctor")
     assert result.exit_code == 0, result.stdout
     assert all(line.startswith("ok") for line in result.stdout.splitlines())
@@ -245,7 +245,7 @@ def test_the_doctor_finds_this_machine_well_and_draws(
 def test_a_checkout_that_is_not_set_up_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tsuya.session.CHECKOUT", tmp_path)
+    monkeypatch.setattr("assets_defs.workspace.CHECKOUT", tmp_path)
     monkeypatch.delenv("DAGSTER_HOME", raising=False)
     result = tsuya("run", "photo_fur")
     assert result.exit_code == 2

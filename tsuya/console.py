@@ -1,0 +1,47 @@
+"""How a command says what went wrong, and where it prints."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+class SetUpError(Exception):
+    """The checkout is not set up, or not as a command needs it."""
+
+
+def says_errors(command: Callable[..., None]) -> Callable[..., None]:
+    """What went wrong as one sentence on stderr, and the exit code that belongs to it."""
+
+    @functools.wraps(command)
+    def wrapped(*arguments: Any, **options: Any) -> None:
+        from storage.errors import StoreError
+
+        try:
+            command(*arguments, **options)
+        except KeyboardInterrupt:
+            fail("Interrupted: what was made stays; run again to go on.", 130)
+        except (ValueError, StoreError, SetUpError) as error:
+            fail(str(error), 2)
+
+    return wrapped
+
+
+def fail(sentence: str, code: int) -> None:
+    """Say why on stderr and end."""
+    click.echo(sentence, err=True)
+    sys.exit(code)
+
+
+def output() -> Console:
+    """Standard output; a file or a pipe gets lines wide enough for the tables."""
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else 160)

@@ -1,0 +1,122 @@
+"""``tsuya run SYSTEM``: one option a dimension, from what the system declares."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from assets_defs.settings import PRESETS
+from assets_defs.system import Dimension, System
+from tsuya.console import says_errors
+
+if TYPE_CHECKING:
+    from tsuya.session import Session
+
+
+def run_command(system: System) -> click.Command:
+    """The command of a system."""
+    options: list[click.Parameter] = [
+        click.Option(
+            [f"--{dimension.name}"],
+            multiple=True,
+            help=f"{_what_may_be_given(dimension)}; may be repeated. "
+            f"Default: {', '.join(dimension.examples)}.",
+        )
+        for dimension in system.dimensions
+    ]
+    options += [
+        click.Option(["--preset"], type=click.Choice(PRESETS), help="Sizes; default: as before."),
+        click.Option(
+            ["--set", "settings"],
+            multiple=True,
+            metavar="FIELD=VALUE",
+            help="A setting, for every asset that has it; may be repeated.",
+        ),
+        click.Option(["--force"], is_flag=True, help="Also make what is current."),
+        click.Option(["--json", "as_json"], is_flag=True, help="Print one JSON object."),
+    ]
+    names = sorted({f for plan in system.plans.values() for f in plan.settings.model_fields})
+
+    @says_errors
+    def launch(
+        preset: str | None, settings: Sequence[str], force: bool, as_json: bool, **items: Any
+    ) -> None:
+        _launch(system, items, preset, settings, force=force, as_json=as_json)
+
+    return click.Command(
+        system.name,
+        callback=launch,
+        params=options,
+        help=f"{system.title}. Settings: {', '.join(names)}.",
+    )
+
+
+def _launch(
+    system: System,
+    items: Mapping[str, Sequence[str]],
+    preset: str | None,
+    settings: Sequence[str],
+    *,
+    force: bool,
+    as_json: bool,
+) -> None:
+    from assets_defs.launcher import Request, check_settings
+    from tsuya.session import launch_all, open_session, report
+
+    with open_session() as session:
+        given = _fields(settings)
+        check_settings(system, preset, given)  # before a file is copied
+        chosen = {
+            dimension.name: [
+                _key(item, system, dimension, given, session)
+                for item in items[dimension.name] or dimension.examples
+            ]
+            for dimension in system.dimensions
+        }
+        request = Request(system, system.cross_product(chosen), preset, given, force)
+        launched = launch_all(session, [request])
+    report(session, launched, as_json)
+
+
+def _what_may_be_given(dimension: Dimension) -> str:
+    folders = ", a folder" if dimension.folders else ""
+    file = (
+        f"A file ({', '.join(dimension.suffixes)}){folders} or one of "
+        if dimension.suffixes
+        else ""
+    )
+    return f"{file}{', '.join(dimension.builtin)}{', a number' if dimension.numbers else ''}"
+
+
+def _key(
+    item: str, system: System, dimension: Dimension, given: Mapping[str, Any], session: Session
+) -> str:
+    """The key of a built-in or registered item; a file is taken into the inbox."""
+    from assets_defs.inbox import take_in
+
+    known = system.sources(dimension.name, session.workspace.inbox(system.name))
+    if item in known or not (dimension.suffixes or dimension.folders):
+        return system.source(dimension.name, item, session.workspace.inbox(system.name)).key
+    if not Path(item).exists():
+        raise ValueError(
+            f"{item}: no such {dimension.name}; expected a file or one of {', '.join(known)}."
+        )
+    return take_in(Path(item), system, dimension, given, session.workspace, session.instance)
+
+
+def _fields(settings: Sequence[str]) -> Mapping[str, Any]:
+    """``FIELD=VALUE`` pairs; values are JSON where they can be, else text."""
+    fields = {}
+    for pair in settings:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise ValueError(f"--set is {pair!r}; expected FIELD=VALUE.")
+        try:
+            fields[name] = json.loads(value)
+        except ValueError:
+            fields[name] = value
+    return fields

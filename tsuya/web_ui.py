@@ -1,0 +1,70 @@
+"""``tsuya ui``: the web UI with its daemon, once for each data folder, at a free port."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import sys
+from pathlib import Path
+
+import click
+
+from assets_defs.workspace import CHECKOUT, Workspace
+from tsuya.console import SetUpError
+
+FIRST_PORT = 3000
+_HOST = "127.0.0.1"
+_TRIED = 100
+
+
+def serve(port: int | None) -> None:
+    """Become ``dg dev`` at ``port``, or at the first free one; say where it is.
+
+    Where one runs already on the same data, say so and end: two daemons would launch everything
+    twice. Raises SetUpError for a port that is in use and where ``make setup`` has not been run.
+    """
+    root = Workspace.of_checkout().root
+    if not os.environ.get("DAGSTER_HOME"):
+        raise SetUpError(f"{CHECKOUT}: DAGSTER_HOME is not set; expected `make setup` to be run.")
+    root.mkdir(parents=True, exist_ok=True)
+    with (root / "ui.lock").open("a+") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.seek(0)
+            click.echo(f"The web UI of {root} runs already: {lock.read().strip()}")
+            return
+        address = f"http://{_HOST}:{_free_port(port)}"
+        lock.truncate(0)
+        lock.write(f"{address}\n")
+        lock.flush()
+        click.echo(f"Web UI: {address} (Ctrl-C ends it)", err=True)
+        sys.stderr.flush()
+        # The lock lives as long as the process that this one becomes.
+        os.set_inheritable(lock.fileno(), True)
+        os.environ["VIRTUAL_ENV"] = sys.prefix  # else dg warns of an environment not activated
+        os.chdir(os.environ["DAGSTER_HOME"])  # a .env beside it would win over the environment
+        program = str(Path(sys.executable).with_name("dg"))
+        place = ["--host", _HOST, "--port", address.rpartition(":")[2]]
+        workspace = ["--workspace", str(CHECKOUT / "workspace.yaml")]
+        os.execv(program, [program, "dev", "--use-active-venv", *place, *workspace])
+
+
+def _free_port(port: int | None) -> int:
+    """The port asked for, or the first free one from 3000. Raises SetUpError."""
+    tried = range(FIRST_PORT, FIRST_PORT + _TRIED) if port is None else (port,)
+    for number in tried:
+        with socket.socket() as listener:
+            # As the server asks for it: a port whose last connection is just closing is free.
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                listener.bind((_HOST, number))
+            except OSError:
+                continue
+            return number
+    raise SetUpError(
+        f"port {tried[0]} is in use; expected a free one: leave out --port to have one found."
+        if port is not None
+        else f"ports {tried[0]} to {tried[-1]} are in use; expected a free one: give --port."
+    )
