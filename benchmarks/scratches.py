@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.solids import plate
+from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches.drawing.frames import cameras
 from pipelines.glass_scratches.drawing.path_tracing import Strategy, Surface, make_surface, trace
 from pipelines.glass_scratches.figures import block_means

@@ -31,13 +31,13 @@ def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:
 
 
 def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
-    from pipelines.geometry.solids import check_closed
+    from pipelines.geometry.solids import make_closed_mesh
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
         vertices, triangles, _ = read_mesh(source.path)
         try:
-            check_closed(vertices, triangles)
+            make_closed_mesh(vertices, triangles)
         except ValueError as error:
             raise ValueError(f"{source.name}: {error}") from error
 

@@ -81,14 +81,15 @@ def glass_object(settings: ObjectSettings, source: Source) -> Result:
     import numpy as np
     import xarray as xr
 
-    from pipelines.geometry.shapes import turned_up
-    from pipelines.geometry.solids import glass_teapot, make_solid, plate
+    from pipelines.geometry.meshes import y_up_to_z_up
+    from pipelines.geometry.solid_shapes import glass_teapot, plate
+    from pipelines.geometry.solids import make_solid
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
         vertices, triangles, _ = read_mesh(source.path)
         if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
-            vertices = turned_up(vertices)
+            vertices = y_up_to_z_up(vertices)
         vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
         vertices /= np.linalg.norm(vertices, axis=1).max()
         solid = make_solid(vertices, triangles)

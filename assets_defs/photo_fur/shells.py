@@ -18,7 +18,7 @@ from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    from pipelines.geometry.shapes import Mesh
+    from pipelines.geometry.meshes import Mesh
 
 
 class MeshSettings(Settings):
@@ -55,7 +55,7 @@ def _step_error(version: StoredVersion) -> float:
 
 
 def _texture_stretch(version: StoredVersion) -> float:
-    from pipelines.geometry.shapes import texture_stretch
+    from pipelines.geometry.texture_coordinates import texture_stretch
 
     dataset = version.dataset.load()
     return texture_stretch(
@@ -66,13 +66,14 @@ def _texture_stretch(version: StoredVersion) -> float:
 def _read(source: Source, settings: MeshSettings) -> Mesh:
     """A mesh of the user's, upright, or a built-in one."""
     from pipelines.geometry import shapes
+    from pipelines.geometry.meshes import make_mesh, y_up_to_z_up
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
         vertices, triangles, uvs = read_mesh(source.path)
         if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
-            vertices = shapes.turned_up(vertices)
-        return shapes.make_mesh(vertices, triangles, uvs)
+            vertices = y_up_to_z_up(vertices)
+        return make_mesh(vertices, triangles, uvs)
     return {
         SQUARE: lambda: shapes.square(32),
         "sphere": lambda: shapes.sphere(64),

@@ -41,7 +41,7 @@ def load_scene(source: Source, settings: SceneSettings) -> Scene:
     """A built-in scene, or a user's, repaired. Raises ValueError, BadInput for one that is none."""
     import numpy as np
 
-    from pipelines.geometry.shapes import turned_up
+    from pipelines.geometry.meshes import y_up_to_z_up
     from pipelines.ssdf_lighting.light.microfacets import Materials
     from pipelines.ssdf_lighting.scene import built_in_scene, make_scene
     from storage.readers.scenes import read_scene
@@ -51,7 +51,7 @@ def load_scene(source: Source, settings: SceneSettings) -> Scene:
     read = read_scene(source.path)
     vertices = read.vertices
     if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
-        vertices = turned_up(vertices)
+        vertices = y_up_to_z_up(vertices)
     materials = Materials(
         np.array([material.albedo for material in read.materials]),
         np.clip([material.specular for material in read.materials], 0.0, 0.99),

@@ -12,7 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.geometry import shapes
+from pipelines.geometry.mesh_edges import (
+    MeshEdges,
+    connected_components,
+    consistent_orientation,
+    first_rows,
+    flip_triangles,
+    mesh_edges,
+)
+from pipelines.geometry.meshes import check_mesh
 
 # More pairs of vertices within the tolerance than this, and than vertices, are not listed at once.
 _MANY_PAIRS = 1_000_000
@@ -25,7 +33,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 _TINY = float(np.finfo(np.float64).tiny)
 
 
-class Repaired(NamedTuple):
+class RepairedMesh(NamedTuple):
     """A mesh whose triangles agree with their neighbours.
 
     vertices: (V', 3) float64, each position once, all used, in the given order.
@@ -40,7 +48,9 @@ class Repaired(NamedTuple):
     notes: tuple[str, ...]
 
 
-def repair(vertices: ArrayLike, triangles: ArrayLike, *, tolerance: float = 1e-7) -> Repaired:
+def repair_mesh(
+    vertices: ArrayLike, triangles: ArrayLike, *, tolerance: float = 1e-7
+) -> RepairedMesh:
     """Merge, clean and orient a triangle mesh.
 
     vertices (V, 3), in any unit; triangles (F, 3) integers; ``tolerance`` in diagonals of the box
@@ -53,18 +63,18 @@ def repair(vertices: ArrayLike, triangles: ArrayLike, *, tolerance: float = 1e-7
     - Triangles that share an edge with one other triangle are made to agree with it. What hangs
       together by such edges is a piece; edges in more than two triangles separate pieces.
     - A closed piece, without borders, faces outwards: it has positive volume. So cavities face
-      into the material around them; `solids.check_closed` knows better. An open piece, and a
+      into the material around them; `solids.make_closed_mesh` knows better. An open piece, and a
       closed one that is flat, faces where most of its area did. A piece with one side only (a
       Moebius strip) stays as it is.
 
     Triangles keep their order and their first corner; those that are turned over have their second
     and third swapped. A repaired mesh is not changed by another repair.
 
-    Raises ValueError for arrays that are not a mesh (see `shapes.check_arrays`), for a negative
+    Raises ValueError for arrays that are not a mesh (see `meshes.check_mesh`), for a negative
     or infinite tolerance, and for a mesh of which nothing is left.
     """
     points, faces = np.array(vertices, np.float64), np.array(triangles)
-    shapes.check_arrays(points, faces)
+    check_mesh(points, faces)
     if not 0 <= tolerance < np.inf:
         raise ValueError(f"tolerance is {tolerance}; expected a finite number of at least 0")
     notes: list[str] = []
@@ -74,7 +84,7 @@ def repair(vertices: ArrayLike, triangles: ArrayLike, *, tolerance: float = 1e-7
         raise ValueError("no triangle has an area; expected at least one that has")
     points, faces = _compact(points, faces[kept])
     _orient(points, faces, notes)
-    return Repaired(points, faces.astype(np.int32), kept, tuple(notes))
+    return RepairedMesh(points, faces.astype(np.int32), kept, tuple(notes))
 
 
 # --- Merging and dropping -----------------------------------------------------------------------
@@ -88,7 +98,7 @@ def _merged(
     place = _equal_rows(points)
     apart = int(place.max()) + 1
     place = _joined(points, place, tolerance)
-    first = _first_rows(place)
+    first = first_rows(place)
     if merged := apart - len(first):
         things = _count(merged, "vertex", "vertices")
         notes.append(f"{things} merged with others within {tolerance:g} of the mesh's extent.")
@@ -110,7 +120,7 @@ def _joined(
     if tolerance < _EPSILON or step == 0:
         return place
     while True:
-        these = points[_first_rows(place)] - low
+        these = points[first_rows(place)] - low
         tree = cKDTree(these, balanced_tree=False)
         pairs = (tree.count_neighbors(tree, step) - len(these)) // 2
         if pairs == 0:
@@ -123,7 +133,7 @@ def _joined(
                 place = cell[place]
                 continue
         near = np.asarray(tree.query_pairs(step, output_type="ndarray"), np.int64)
-        return connected(near, len(these))[place]
+        return connected_components(near, len(these))[place]
 
 
 def _worth_keeping(
@@ -135,7 +145,7 @@ def _worth_keeping(
         things = _count(flat, "triangle", "triangles")
         notes.append(f"{things} dropped: repeated corners or no area.")
     corners = np.sort(triangles[kept], axis=1)
-    kept = kept[np.sort(_first_rows(_equal_rows(corners)))]
+    kept = kept[np.sort(first_rows(_equal_rows(corners)))]
     if repeated := len(corners) - len(kept):
         things = _count(repeated, "triangle", "triangles")
         notes.append(f"{things} dropped: the same corners as others.")
@@ -177,108 +187,13 @@ def _equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int
     return number
 
 
-def _first_rows(number: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The first row with each number, of numbers (N,) from 0 without gaps."""
-    first = np.full(number.max(initial=-1) + 1, len(number))
-    np.minimum.at(first, number, np.arange(len(number)))
-    return first
-
-
 # --- Orienting ----------------------------------------------------------------------------------
 
 
-class Edges(NamedTuple):
-    """The edges of triangles (F, 3). Half-edge 3 f + k goes from triangle f's corner k to the next.
-
-    half_edges: (3 F,) int64, edge by edge, ascending within an edge.
-    start: (E,) int64, where each edge's half-edges begin.
-    uses: (E,) int64, how many triangles each edge is in.
-    forwards: (3 F,) bool, by half-edge: whether it goes from the lower to the higher vertex.
-    """
-
-    half_edges: NDArray[np.int64]
-    start: NDArray[np.int64]
-    uses: NDArray[np.int64]
-    forwards: NDArray[np.bool_]
-
-    def pairs(self) -> NDArray[np.int64]:
-        """Half-edges (N, 2) of those edges that are in two triangles."""
-        return self.half_edges[self.start[self.uses == 2][:, None] + np.arange(2)]
-
-
-def edges(triangles: NDArray[np.int64]) -> Edges:
-    """The edges of triangles (F, 3), whose corners are three different vertices each."""
-    begin, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    key = np.minimum(begin, end) * (int(triangles.max()) + 1) + np.maximum(begin, end)
-    order = np.argsort(key, kind="stable")
-    ordered = key[order]
-    start = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
-    uses = np.diff(np.append(start, len(key)))
-    return Edges(order, start, uses, begin < end)
-
-
-def edge_ends(triangles: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Both vertices (E, 2) of each edge of triangles (F, 3), the lower first; each edge once."""
-    found = edges(triangles.astype(np.int64))
-    half = found.half_edges[found.start]
-    begin, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    return np.sort(np.stack([begin[half], end[half]], axis=-1), axis=1).astype(np.int64)
-
-
-class Sides(NamedTuple):
-    """How triangles have to be turned over for all neighbours to agree.
-
-    piece: (F,) int64, the piece that each triangle is part of.
-    turned: (F,) bool; the first triangle of each piece is not.
-    one_sided: (pieces,) bool, whether no way to turn its triangles makes them agree.
-    """
-
-    piece: NDArray[np.int64]
-    turned: NDArray[np.bool_]
-    one_sided: NDArray[np.bool_]
-
-
-def sides(pairs: NDArray[np.int64], forwards: NDArray[np.bool_]) -> Sides:
-    """The pieces of triangles, neighbours by the pairs (N, 2) of half-edges at one edge;
-    ``forwards`` as in :class:`Edges`.
-
-    Each triangle stands for two, as it is and turned over, linked to its neighbours' that agree
-    with it: a surface with two sides falls into two parts, one for each way to orient it.
-    """
-    count = len(forwards) // 3
-    first, second = (pairs // 3).T
-    agree = forwards[pairs[:, 0]] != forwards[pairs[:, 1]]
-    other = np.where(agree, 0, count)
-    as_is = np.stack([first, second + other], axis=-1)
-    turned = np.stack([first + count, second + count - other], axis=-1)
-    part = connected(np.concatenate([as_is, turned]), 2 * count)
-    own, opposite = part[:count], part[count:]
-    _, piece = np.unique(np.minimum(own, opposite), return_inverse=True)
-    piece = piece.reshape(-1)
-    one_sided = np.zeros(piece.max() + 1, bool)
-    one_sided[piece[own == opposite]] = True
-    return Sides(piece, own != own[_first_rows(piece)][piece], one_sided)
-
-
-def connected(links: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """(count,): which connected component each of ``count`` nodes is in, by links (N, 2)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    return np.asarray(label, np.int64)
-
-
-def turn_over(triangles: NDArray[np.int64], which: NDArray[np.bool_]) -> None:
-    """Swap the second and third corner of some triangles (F, 3), in place; ``which`` (F,)."""
-    triangles[which] = triangles[which][:, [0, 2, 1]]
-
-
 def _orient(vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: list[str]) -> None:
-    """Turn triangles over, in place, as `repair` says."""
-    edge = edges(triangles)
-    piece, turned, one_sided = sides(edge.pairs(), edge.forwards)
+    """Turn triangles over, in place, as `repair_mesh` says."""
+    edge = mesh_edges(triangles)
+    piece, turned, one_sided = consistent_orientation(edge.pairs(), edge.forwards)
     turned &= ~one_sided[piece]
     closed = _closed(edge, piece, turned) & ~one_sided
     area, volume = _areas_and_volumes(vertices, triangles, piece)
@@ -288,7 +203,7 @@ def _orient(vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: 
     majority = np.bincount(piece, np.where(turned, -area, area))
     wrong = np.where(solid, signed < 0, majority < 0) & ~one_sided
     turned ^= wrong[piece]
-    turn_over(triangles, turned)
+    flip_triangles(triangles, turned)
 
     if outwards := int((turned & solid[piece]).sum()):
         things = _count(outwards, "triangle", "triangles")
@@ -307,7 +222,9 @@ def _orient(vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: 
         notes.append(f"the mesh is open along {things}.")
 
 
-def _closed(edge: Edges, piece: NDArray[np.int64], turned: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _closed(
+    edge: MeshEdges, piece: NDArray[np.int64], turned: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """(pieces,): whether a piece passes each of its edges as often in one sense as in the other.
 
     So a piece that only touches itself or another along an edge is closed: its volume is as
@@ -332,7 +249,7 @@ def _areas_and_volumes(
     """(F,) twice: doubled areas, and six times the volumes between triangles and a corner of their
     piece, in units of the mesh's size: small pieces far from the origin lose nothing."""
     scale = max(float(np.ptp(vertices, axis=0).max()), _TINY)
-    corner = vertices[triangles[_first_rows(piece), 0]][piece]
+    corner = vertices[triangles[first_rows(piece), 0]][piece]
     a, b, c = ((vertices[triangles[:, k]] - corner) / scale for k in range(3))
     area: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     volume: NDArray[np.float64] = np.einsum("fi,fi->f", a, np.cross(b, c))

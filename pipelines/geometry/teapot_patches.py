@@ -1,4 +1,4 @@
-"""The Utah teapot's control points: 32 bicubic Bezier patches.
+"""The Utah teapot: the control points of its 32 bicubic Bezier patches, and grids of positions.
 
 Measured by Martin Newell, 1975 (University of Utah), in the usual form, a quarter lower than the
 pot itself; the bottom's four patches are Frank Crow's ("The origins of the teapot", IEEE Computer
@@ -12,8 +12,17 @@ knob's 0.8). Handle and spout are given by their halves with y <= 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+
+# The middle of the box around Newell's teapot, and the radius of the sphere around that.
+_NEWELL_CENTRE = np.array([0.21703756, 0.0, 1.575])
+_NEWELL_RADIUS = 3.34029113
+
+TEAPOT_CENTRE = _NEWELL_CENTRE / _NEWELL_RADIUS
+"""(3,): the middle of the teapot's box, in the coordinates of its grids (see `swept_grid`)."""
 
 Profile = tuple[tuple[float, float, float], ...]
 """Four rows (r, o, z) of one swept patch."""
@@ -75,3 +84,52 @@ def swept_quarter(profile: Profile) -> NDArray[np.float64]:
     profile, columns around the axis."""
     rows = [((r, 0, z), (r, -o, z), (o, -r, z), (0, -r, z)) for r, o, z in profile]
     return np.array(rows, np.float64)
+
+
+# --- Grids, as in `grid_charts` -----------------------------------------------------------------
+
+
+def _bezier(control: NDArray[np.float64], segments: int) -> NDArray[np.float64]:
+    """Points (segments + 1, segments + 1, 3) of a bicubic patch's control points (4, 4, 3).
+
+    Summed term by term, in one order for all points: patches meet to the last bit.
+    """
+    t = np.linspace(0.0, 1.0, segments + 1)
+    weights = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3)
+    rows = np.zeros((4, segments + 1, 3))
+    points = np.zeros((segments + 1, segments + 1, 3))
+    for column, weight in enumerate(weights):
+        rows += weight[:, None] * control[:, None, column]
+    for row, weight in enumerate(weights):
+        points += weight[:, None, None] * rows[row]
+    return points
+
+
+def _rows_joined(patches: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    return np.concatenate([patches[0], *(patch[1:] for patch in patches[1:])])
+
+
+def swept_grid(profiles: Sequence[Profile], segments: int) -> NDArray[np.float64]:
+    """Swept patches of the teapot, one below the other, all around, clockwise from -x.
+
+    As a grid; z up, in units of the sphere around the teapot, which stands on z = 0.
+    """
+    controls = [swept_quarter(profile) / _NEWELL_RADIUS for profile in profiles]
+    quarter = _rows_joined([_bezier(control, segments) for control in controls])
+    quarter[..., 2] = quarter[:, :1, 2]  # without rounding errors: a pole is one position
+    x, y, z = np.moveaxis(quarter, -1, 0)
+    turned = [(-x, -y), (-y, x), (x, y), (y, -x)]  # turns by quarters are exact
+    sides = [np.stack([*xy, z], axis=-1) for xy in turned]
+    return np.concatenate([sides[0], *(side[:, 1:] for side in sides[1:])], axis=1)
+
+
+def tube_grid(halves: NDArray[np.float64], segments: int, first_column: int) -> NDArray[np.float64]:
+    """A tube of the teapot, from the patches of its one half and their mirror image in y.
+
+    As a grid in the coordinates of `swept_grid`, of 2 ``segments`` + 1 rows and columns; the
+    halves' column ``first_column`` comes first.
+    """
+    half = _rows_joined([_bezier(control / _NEWELL_RADIUS, segments) for control in halves])
+    other = half[:, -2:0:-1] * [1, -1, 1]
+    ring = np.roll(np.concatenate([half, other], axis=1), -first_column, axis=1)
+    return np.concatenate([ring, ring[:, :1]], axis=1)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.shapes import Mesh
+from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur.attenuation import require_layers
 
 USUAL_THICKNESS = 0.06

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.repair import edge_ends
+from pipelines.geometry.mesh_edges import edge_vertices
 from pipelines.ssdf_lighting.distances.octahedral import (
     NO_EDGE,
     delaunay_sides,
@@ -252,7 +252,7 @@ def border_step(
     errors (V, D), or any sample of vertices' directions: found minus true. Ratio of the RMS
     difference over edges with ends in two clusters and edges with both in one; 1 is no step.
     """
-    edges = edge_ends(triangles)
+    edges = edge_vertices(triangles)
     between = cluster[edges[:, 0]] != cluster[edges[:, 1]]
     if between.all() or not between.any():
         return 1.0

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry import shapes
-from pipelines.geometry.repair import repair
+from pipelines.geometry.meshes import check_mesh
+from pipelines.geometry.repair import repair_mesh
 from pipelines.geometry.solids import creased_normals
 from pipelines.ssdf_lighting.light.microfacets import Materials
 
@@ -73,19 +74,19 @@ class SplitScene(NamedTuple):
 def make_scene(
     vertices: ArrayLike, triangles: ArrayLike, part: ArrayLike, materials: Materials
 ) -> Scene:
-    """Repair, centre and scale a mesh (see `mesh_repair.repair`), and split it along sharp edges.
+    """Repair, centre and scale a mesh (see `repair.repair_mesh`), and split it along sharp edges.
 
     vertices (V, 3); triangles (F, 3) and part (F,) integers. Raises ValueError for what is no mesh.
     """
     points = np.array(vertices, np.float64)
     corners = np.asarray(triangles)
-    shapes.check_arrays(points, corners)
+    check_mesh(points, corners)
     used = points[np.unique(corners)]
     middle = (used.min(axis=0) + used.max(axis=0)) / 2.0
     scale = float(np.linalg.norm(used - middle, axis=1).max())
     if not scale > 0.0:
         raise ValueError("all vertices are at one position; expected a mesh of some size.")
-    mended = repair((points - middle) / scale, corners)
+    mended = repair_mesh((points - middle) / scale, corners)
     at_corners = creased_normals(mended.vertices, mended.triangles, _CREASE)
     rows = np.column_stack([mended.triangles.ravel(), np.rint(at_corners.reshape(-1, 3) / _ALIKE)])
     _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)

@@ -14,7 +14,7 @@ from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from pipelines.drawing import colour
-from pipelines.geometry import solids
+from pipelines.geometry import solid_shapes
 from pipelines.glass_scratches.drawing import frames
 from pipelines.glass_scratches.layers import scratch_layers as layers
 from pipelines.glass_scratches.tables import profiles, sampling
@@ -105,7 +105,7 @@ def test_a_profile_a_mesh_and_an_environment_of_the_users(make_house: Any, tmp_p
     profile = inbox / "diamond.csv"
     profile.write_text("v,n\n-6,0\n-4,1\n-1,-3\n0,-3.5\n2,-2\n4,1.5\n7,0\n")
     mesh = inbox / "block.obj"
-    solid = solids.plate(1.0, 1.0, 0.6)
+    solid = solid_shapes.plate(1.0, 1.0, 0.6)
     mesh.write_text(
         "".join(f"v {x} {y} {z}\n" for x, y, z in solid.vertices)
         + "".join(f"f {a} {b} {c}\n" for a, b, c in solid.triangles + 1)
@@ -226,8 +226,8 @@ REGRESSIONS = (
     Regression("largest_share", sampling, "make_lobe", _generous_sampler, SETTING),
     Regression("coverage_error", layers, "make_layers", _wide_scratches, SETTING),
     Regression("map_z", layers, "coverage_maps", _moved_map, SETTING),
-    Regression("edge_error", solids, "plate", _holed, PLATE),
-    Regression("volume", solids, "plate", _smaller, PLATE),
+    Regression("edge_error", solid_shapes, "plate", _holed, PLATE),
+    Regression("volume", solid_shapes, "plate", _smaller, PLATE),
     Regression("not_finite", frames, "trace", _negative_pixel, KEYS),
     Regression("furnace_excess", frames, "furnace", _furnace_times(1.1), KEYS),
     Regression("furnace_loss", frames, "furnace", _furnace_times(0.9), KEYS),

@@ -12,6 +12,7 @@ from assets_defs.launcher import LaunchError, Request
 from assets_defs.photo_fur.datasets import LOADERS
 from assets_defs.photo_fur.graph import FUR
 from pipelines.geometry import shapes
+from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
@@ -126,7 +127,7 @@ def _doubled_masks(right: Callable[..., Any], layer: Any, layers: int) -> Any:
 
 def _stretched_teapot(right: Callable[..., Any], segments: int) -> Any:
     mesh = right(segments)
-    return shapes.Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
+    return Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
 
 
 def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

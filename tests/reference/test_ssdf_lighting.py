@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from pipelines.drawing.stage import orbit
+from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.rays import build_scene, first_hits
-from pipelines.geometry.shapes import Mesh, sphere, square
+from pipelines.geometry.shapes import sphere, square
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.drawing.ray_traced import ray_traced
 from pipelines.ssdf_lighting.light.shading import Materials

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.geometry.mesh_edges import connected_components, edge_vertices, mesh_edges
 from pipelines.geometry.rays import build_scene, first_hits, occluded
-from pipelines.geometry.repair import connected, edge_ends, edges
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def stand_ins_for_buried(
     number = np.arange(len(vertices))
     if not buried.any() or buried.all():
         return number
-    sides = edge_ends(triangles)
+    sides = edge_vertices(triangles)
     lengths = np.linalg.norm(vertices[sides[:, 0]] - vertices[sides[:, 1]], axis=1)
     size = (len(vertices), len(vertices))
     graph = coo_array((lengths, (sides[:, 0], sides[:, 1])), shape=size).tocsr()
@@ -262,7 +262,9 @@ def _pieces(
     """
     import open3d as o3d
 
-    piece = connected(edges(triangles.astype(np.int64)).pairs() // 3, len(triangles))
+    piece = connected_components(
+        mesh_edges(triangles.astype(np.int64)).pairs() // 3, len(triangles)
+    )
     piece %= _MOST_PIECES
     order = np.argsort(piece, kind="stable")
     counts = np.bincount(piece)

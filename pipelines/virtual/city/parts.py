@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.geometry.shapes import grid_triangles
+from pipelines.geometry.meshes import grid_triangles
 
 FloatArray = NDArray[np.float64]
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from pipelines.geometry import repair as repairing
 from pipelines.geometry import shapes
-from pipelines.geometry.repair import Repaired, repair
-from pipelines.geometry.solids import check_closed, glass_teapot
+from pipelines.geometry.repair import RepairedMesh, repair_mesh
+from pipelines.geometry.solid_shapes import glass_teapot
+from pipelines.geometry.solids import make_closed_mesh
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -34,7 +35,7 @@ def closed_shapes() -> dict[str, tuple[Array, Rows]]:
     pot, ball = glass_teapot(4), shapes.sphere(8)
     closed = {
         "cube": (CUBE, CUBE_TRIANGLES),
-        "sphere": check_closed(ball.vertices, ball.triangles),
+        "sphere": make_closed_mesh(ball.vertices, ball.triangles),
         "teapot": (pot.vertices, pot.triangles),
     }
     return {name: (np.array(v), np.array(f, np.int64)) for name, (v, f) in closed.items()}
@@ -59,7 +60,7 @@ def senses(triangles: NDArray[np.integer]) -> dict[Edge, list[tuple[int, bool]]]
     return passed
 
 
-def assert_as_documented(mesh: Repaired) -> None:
+def assert_as_documented(mesh: RepairedMesh) -> None:
     assert mesh.vertices.dtype == np.float64
     assert mesh.triangles.dtype == np.int32
     assert mesh.kept.dtype == np.int64
@@ -71,7 +72,7 @@ def assert_as_documented(mesh: Repaired) -> None:
         assert ". " not in note
 
 
-def assert_not_changed_by(mesh: Repaired, again: Repaired) -> None:
+def assert_not_changed_by(mesh: RepairedMesh, again: RepairedMesh) -> None:
     np.testing.assert_array_equal(again.vertices, mesh.vertices)
     np.testing.assert_array_equal(again.triangles, mesh.triangles)
     np.testing.assert_array_equal(again.kept, np.arange(len(mesh.triangles)))
@@ -83,7 +84,7 @@ def assert_not_changed_by(mesh: Repaired, again: Repaired) -> None:
 @pytest.mark.parametrize("name", ["cube", "sphere", "teapot"])
 def test_a_sound_mesh_is_kept(name: str) -> None:
     vertices, triangles = closed_shapes()[name]
-    mesh = repair(vertices, triangles)
+    mesh = repair_mesh(vertices, triangles)
     assert mesh.notes == ()
     np.testing.assert_array_equal(mesh.vertices, vertices)
     np.testing.assert_array_equal(mesh.triangles, triangles)
@@ -115,7 +116,7 @@ def test_splits_and_flips_of_a_closed_mesh_are_undone(
     split[corners] = vertices[mixed.ravel()]
     if jitter and not offset:  # far away the doubles are too far apart for that
         split += random.uniform(-1, 1, split.shape) * jitter * extent
-    mesh = repair(split, corners.reshape(-1, 3))
+    mesh = repair_mesh(split, corners.reshape(-1, 3))
 
     assert_as_documented(mesh)
     np.testing.assert_array_equal(mesh.kept, np.arange(len(triangles)))
@@ -129,12 +130,12 @@ def test_splits_and_flips_of_a_closed_mesh_are_undone(
     turned = f"{over.sum()} triangle{'' if over.sum() == 1 else 's'} of closed pieces turned over"
     assert any(note.startswith(turned) for note in mesh.notes) == over.any()
     assert any("merged" in note for note in mesh.notes) == bool(jitter and not offset)
-    assert_not_changed_by(mesh, repair(mesh.vertices, mesh.triangles))
+    assert_not_changed_by(mesh, repair_mesh(mesh.vertices, mesh.triangles))
 
 
 def test_each_closed_piece_faces_outwards_by_itself() -> None:
     vertices = np.concatenate([CUBE, CUBE * 0.01 + 1e4, CUBE - 3])
-    mesh = repair(vertices, np.concatenate([INSIDE_OUT, INSIDE_OUT + 8, CUBE_TRIANGLES + 16]))
+    mesh = repair_mesh(vertices, np.concatenate([INSIDE_OUT, INSIDE_OUT + 8, CUBE_TRIANGLES + 16]))
     assert mesh.notes == ("24 triangles of closed pieces turned over to face outwards.",)
     for part, expected in enumerate((1.0, 1e-6, 1.0)):
         mine = mesh.triangles[12 * part : 12 * part + 12]
@@ -146,7 +147,7 @@ def test_each_closed_piece_faces_outwards_by_itself() -> None:
 def test_cubes_that_touch_along_an_edge_face_outwards() -> None:
     """Their common edge is in four triangles, of two surfaces that are closed."""
     vertices = np.concatenate([CUBE, CUBE + np.array([1, 1, 0])])
-    mesh = repair(vertices, np.concatenate([CUBE_TRIANGLES, INSIDE_OUT + 8]))
+    mesh = repair_mesh(vertices, np.concatenate([CUBE_TRIANGLES, INSIDE_OUT + 8]))
     assert len(mesh.vertices) == 14
     assert mesh.notes == (
         "12 triangles of closed pieces turned over to face outwards.",
@@ -166,7 +167,7 @@ def test_an_open_piece_faces_as_most_of_its_area(turned: tuple[int, ...]) -> Non
     triangles = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 4]])
     given = triangles.copy()
     given[list(turned)] = given[list(turned)][:, ::-1]
-    mesh = repair(vertices, given)
+    mesh = repair_mesh(vertices, given)
     up = np.cross(*np.moveaxis(np.diff(mesh.vertices[mesh.triangles], axis=1), 1, 0))[:, 2]
     assert (np.sign(up) == (-1 if 0 in turned else 1)).all()
     changed = {(0,): 2, (1, 2): 2, (0, 1, 2): 0, (): 0}[turned]
@@ -177,7 +178,7 @@ def test_an_open_piece_faces_as_most_of_its_area(turned: tuple[int, ...]) -> Non
 def test_a_seam_of_the_texture_is_no_border() -> None:
     """Newell's teapot is open at its rims: its borders by brute force over its positions."""
     pot = shapes.teapot(4)
-    mesh = repair(pot.vertices, pot.triangles)
+    mesh = repair_mesh(pot.vertices, pot.triangles)
     assert_as_documented(mesh)
     place = {position: row for row, position in enumerate(map(tuple, mesh.vertices + 0.0))}
     number = np.array([place[position] for position in map(tuple, pot.vertices + 0.0)])
@@ -206,7 +207,7 @@ def test_a_moebius_strip_is_left_as_given() -> None:
     over = np.random.default_rng(3).random(24) < 0.5
     triangles[over] = triangles[over][:, ::-1]
     both = np.concatenate([triangles, INSIDE_OUT + len(vertices)])
-    mesh = repair(np.concatenate([vertices, CUBE + 5]), both)
+    mesh = repair_mesh(np.concatenate([vertices, CUBE + 5]), both)
     np.testing.assert_array_equal(mesh.triangles[:24], triangles)
     assert mesh.notes == (
         "12 triangles of closed pieces turned over to face outwards.",
@@ -217,7 +218,9 @@ def test_a_moebius_strip_is_left_as_given() -> None:
 
 def test_a_band_that_is_not_twisted_has_two_sides() -> None:
     vertices, triangles = strip(12, twisted=False)
-    mesh = repair(vertices, np.where(np.arange(24)[:, None] == 7, triangles[:, ::-1], triangles))
+    mesh = repair_mesh(
+        vertices, np.where(np.arange(24)[:, None] == 7, triangles[:, ::-1], triangles)
+    )
     np.testing.assert_array_equal(turned_to_least(mesh.triangles), turned_to_least(triangles))
     assert mesh.notes[0].startswith("1 triangle of open pieces turned over")
 
@@ -225,7 +228,7 @@ def test_a_band_that_is_not_twisted_has_two_sides() -> None:
 def test_an_edge_in_three_triangles_separates_pieces() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]], float)
     triangles = np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4]])
-    mesh = repair(vertices, triangles)
+    mesh = repair_mesh(vertices, triangles)
     np.testing.assert_array_equal(mesh.triangles, triangles)
     assert mesh.notes == (
         "1 edge is in more than two triangles: pieces end there.",
@@ -275,9 +278,9 @@ def test_any_triangles(corners: list[tuple[int, int, int]], seed: int) -> None:
             expected.setdefault(frozenset(triangle), row)
     if not expected:
         with pytest.raises(ValueError, match="no triangle has an area"):
-            repair(vertices, given_)
+            repair_mesh(vertices, given_)
         return
-    mesh = repair(vertices, given_)
+    mesh = repair_mesh(vertices, given_)
     assert_as_documented(mesh)
     assert mesh.kept.tolist() == list(expected.values())
     position = mesh.vertices[mesh.triangles]
@@ -311,7 +314,7 @@ def test_any_triangles(corners: list[tuple[int, int, int]], seed: int) -> None:
     assert any(f"{branching} edge" in note for note in mesh.notes) == (branching > 0)
     border = sum(len(ends) == 1 for ends in edges.values())
     assert any(f"along {border} border" in note for note in mesh.notes) == (border > 0)
-    assert_not_changed_by(mesh, repair(mesh.vertices, mesh.triangles))
+    assert_not_changed_by(mesh, repair_mesh(mesh.vertices, mesh.triangles))
 
 
 def groups_by_chains(points: Array, step: float) -> list[int]:
@@ -374,7 +377,7 @@ def test_triangles_without_area_are_dropped(offset: float, size: float) -> None:
     middle = ends[0] + 0.37 * (ends[1] - ends[0])
     vertices = np.concatenate([ends, [middle]]) * size + offset
     triangles = np.array([[0, 4, 1], [0, 1, 2], [0, 0, 2], [2, 2, 2], [2, 1, 4]])
-    mesh = repair(vertices, triangles)
+    mesh = repair_mesh(vertices, triangles)
     assert mesh.kept.tolist() == [1, 4]
     np.testing.assert_array_equal(mesh.vertices, vertices[[0, 1, 2, 4]])
     assert mesh.notes[0] == "3 triangles dropped: repeated corners or no area."
@@ -383,19 +386,19 @@ def test_triangles_without_area_are_dropped(offset: float, size: float) -> None:
 def test_thin_triangles_are_kept() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-6, 0], [1e6, 0, 1], [1e6, 1e-3, 1]])
     triangles = np.array([[0, 1, 2], [2, 3, 4]])
-    np.testing.assert_array_equal(repair(vertices, triangles, tolerance=0).kept, [0, 1])
+    np.testing.assert_array_equal(repair_mesh(vertices, triangles, tolerance=0).kept, [0, 1])
 
 
 def test_triangles_that_merging_flattens_are_dropped() -> None:
     needle = np.array([[0, 0, 0], [0, 1e-8, 0], [1, 0, 0], [0, 1, 0]])
-    mesh = repair(needle, [[0, 2, 1], [1, 2, 3]])
+    mesh = repair_mesh(needle, [[0, 2, 1], [1, 2, 3]])
     assert mesh.kept.tolist() == [1]
     np.testing.assert_array_equal(mesh.vertices, needle[[0, 2, 3]])
     assert mesh.notes[:2] == (
         "1 vertex merged with others within 1e-07 of the mesh's extent.",
         "1 triangle dropped: repeated corners or no area.",
     )
-    assert repair(needle, [[0, 2, 1], [1, 2, 3]], tolerance=1e-9).kept.tolist() == [0, 1]
+    assert repair_mesh(needle, [[0, 2, 1], [1, 2, 3]], tolerance=1e-9).kept.tolist() == [0, 1]
 
 
 @settings(max_examples=30, deadline=None)
@@ -407,7 +410,7 @@ def test_of_equal_triangles_the_first_is_kept(seed: int) -> None:
     order = random.permutation(32)
     triangles = np.concatenate([CUBE_TRIANGLES, turned])[order]
     origin = np.concatenate([np.arange(12), copies])[order]
-    mesh = repair(CUBE, triangles)
+    mesh = repair_mesh(CUBE, triangles)
     assert mesh.kept.tolist() == sorted(int(np.argmax(origin == row)) for row in range(12))
     assert mesh.notes[0] == "20 triangles dropped: the same corners as others."
     assert volume(mesh.vertices, mesh.triangles) == pytest.approx(1)
@@ -415,7 +418,7 @@ def test_of_equal_triangles_the_first_is_kept(seed: int) -> None:
 
 def test_vertices_without_a_triangle_say_nothing() -> None:
     vertices = np.concatenate([[[1e9, 0, 0]], CUBE, [[-1e9, 0, 0]]])
-    mesh = repair(vertices, CUBE_TRIANGLES + 1)
+    mesh = repair_mesh(vertices, CUBE_TRIANGLES + 1)
     np.testing.assert_array_equal(mesh.vertices, CUBE)
     assert mesh.notes == ()
 
@@ -446,4 +449,4 @@ def test_what_cannot_be_repaired(
     vertices: Array, triangles: Rows, tolerance: float, reason: str
 ) -> None:
     with pytest.raises(ValueError, match=reason):
-        repair(vertices, triangles, tolerance=tolerance)
+        repair_mesh(vertices, triangles, tolerance=tolerance)

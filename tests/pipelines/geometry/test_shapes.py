@@ -1,35 +1,18 @@
-"""Shapes, normals and texture coordinates against closed forms, topology and trimesh."""
+"""Square, sphere and teapot against closed forms, topology and trimesh."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
-from random import Random
 
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pipelines.geometry import shapes
-from pipelines.geometry.shapes import (
-    Mesh,
-    make_mesh,
-    sphere,
-    square,
-    teapot,
-    unwrap,
-    vertex_normals,
-)
+from pipelines.geometry.meshes import Mesh
+from pipelines.geometry.shapes import sphere, square, teapot
 from pipelines.geometry.teapot_patches import HANDLE, KNOB, RIM, SPOUT, swept_quarter
-
-
-def merged(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Positions and triangles without the copies along the charts' borders."""
-    positions, number = np.unique(mesh.vertices, axis=0, return_inverse=True)
-    return positions, number.reshape(-1)[mesh.triangles]
+from tests.pipelines.geometry.mesh_figures import merged, quantiles, stretches
 
 
 def edge_counts(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -38,28 +21,6 @@ def edge_counts(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArra
     _, once = np.unique(directed, axis=0, return_counts=True)
     _, shared = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
     return shared, once
-
-
-def stretches(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Singular values (F, 2) and determinants (F,) of the maps from the surface to the chart,
-    and the triangles' areas (F,)."""
-    corners, uvs = mesh.vertices[mesh.triangles], mesh.uvs[mesh.triangles]
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(first, second)
-    area = np.linalg.norm(normal, axis=1)
-    x = first / np.linalg.norm(first, axis=1, keepdims=True)
-    y = np.cross(normal / area[:, None], x)
-    surface = np.einsum("afi,bfi->fba", [first, second], [x, y])
-    chart = np.stack([uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]], axis=-1)
-    jacobian = chart @ np.linalg.inv(surface)
-    singular = np.linalg.svd(jacobian, compute_uv=False).astype(np.float64)
-    return singular, np.linalg.det(jacobian), area / 2
-
-
-def quantiles(values: NDArray[np.float64], weights: NDArray[np.float64], *at: float) -> list[float]:
-    order = np.argsort(values)
-    passed = np.cumsum(weights[order]) / weights.sum()
-    return [float(values[order][np.searchsorted(passed, level)]) for level in at]
 
 
 def shown_texel(uvs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -234,112 +195,3 @@ def test_the_teapots_seams_show_only_between_charts() -> None:
     assert positions_that_show_two_texels(mesh) == between_charts + touching
     smaller = Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [2.7, 3.9], mesh.normals)
     assert positions_that_show_two_texels(smaller) == between_charts + touching
-
-
-# --- Normals ------------------------------------------------------------------------------------
-
-CUBE = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
-CUBE_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-
-
-@given(st.lists(st.booleans(), min_size=6, max_size=6))
-def test_a_cubes_normals_do_not_depend_on_its_diagonals(diagonals: list[bool]) -> None:
-    triangles = []
-    for (a, b, c, d), other in zip(CUBE_SIDES, diagonals, strict=True):
-        triangles += [(b, c, d), (d, a, b)] if other else [(a, b, c), (c, d, a)]
-    normals = vertex_normals(CUBE, np.array(triangles))
-    np.testing.assert_allclose(normals, (2 * CUBE - 1) / np.sqrt(3), atol=1e-12)
-
-
-def test_normals_agree_with_trimesh() -> None:
-    positions, triangles = merged(teapot(8))
-    reference = trimesh.Trimesh(positions, triangles, process=False)
-    ours = vertex_normals(positions, triangles)
-    np.testing.assert_allclose(ours, reference.vertex_normals, atol=1e-6)
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.randoms(use_true_random=False))
-def test_split_vertices_get_the_normals_of_the_closed_surface(random: Random) -> None:
-    positions, triangles = merged(sphere(6))
-    together = vertex_normals(positions, triangles)
-    copies = np.array([random.random() < 0.5 for _ in range(triangles.size)])
-    copies = copies.reshape(triangles.shape)
-    split = np.where(copies, triangles + len(positions), triangles)
-    apart = vertex_normals(np.concatenate([positions, positions]), split)
-    np.testing.assert_allclose(apart[split], together[triangles], atol=1e-12)
-
-
-def test_a_sheet_with_two_sides_keeps_both() -> None:
-    front = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
-    normals = vertex_normals(np.concatenate([front, front]), np.array([[0, 1, 2], [3, 5, 4]]))
-    np.testing.assert_array_equal(normals[:, 2], [1, 1, 1, -1, -1, -1])
-
-
-def test_normals_without_triangles_or_area_are_unit_and_finite() -> None:
-    points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [5, 5, 5]], float)
-    normals = vertex_normals(points, np.array([[0, 1, 2]]))
-    np.testing.assert_array_equal(normals, np.tile([0, 0, 1], (4, 1)))
-
-
-# --- Meshes without texture coordinates ---------------------------------------------------------
-
-
-def test_unwrapped_charts_are_to_scale_and_not_mirrored() -> None:
-    positions, triangles = merged(sphere(32))
-    vertices, faces, uvs = unwrap(7 * positions + [100, 0, 0], triangles)
-    np.testing.assert_array_equal(vertices[faces], (7 * positions + [100, 0, 0])[triangles])
-    mesh = make_mesh(7 * positions + [100, 0, 0], triangles)
-    np.testing.assert_array_equal(mesh.uvs, uvs)  # the same each time
-    singular, determinant, area = stretches(mesh)
-    assert (determinant > 0).all()
-    assert quantiles(singular[:, 0] / singular[:, 1], area, 0.9)[0] < 1.1
-    # One photograph is as wide as the radius.
-    assert quantiles(7 * np.sqrt(determinant), area, 0.5)[0] == pytest.approx(1, abs=0.05)
-    outwards = (mesh.vertices - [100, 0, 0]) / 7
-    assert (np.einsum("ij,ij->i", mesh.normals, outwards) > 0.99).all()  # no cracks
-
-
-def test_given_texture_coordinates_are_kept() -> None:
-    uvs = CUBE[:, :2] * 3
-    mesh = make_mesh(CUBE, np.array([[0, 1, 3], [0, 3, 2]]), uvs)
-    np.testing.assert_array_equal(mesh.uvs, uvs)
-    np.testing.assert_array_equal(mesh.vertices, CUBE)
-
-
-@pytest.mark.parametrize(
-    ("vertices", "triangles", "uvs", "reason"),
-    [
-        (CUBE[:, :2], [[0, 1, 2]], None, r"vertices have the shape \(8, 2\)"),
-        (CUBE * np.nan, [[0, 1, 2]], None, "vertices have the shape .* finite"),
-        (CUBE, [[0.0, 1.0, 2.0]], None, "triangles have the shape .* integers"),
-        (CUBE, [[0, 1, 2, 3]], None, r"triangles have the shape \(1, 4\)"),
-        (CUBE, np.zeros((0, 3), int), None, "there are no triangles"),
-        (CUBE, [[0, 1, 8]], None, "vertices 0 to 8; expected 0 to 7"),
-        (CUBE, [[0, 1, -1]], None, "vertices -1 to 1"),
-        (CUBE, [[0, 1, 2]], CUBE, r"uvs have the shape \(8, 3\); expected \(8, 2\)"),
-        (CUBE, [[0, 1, 2]], np.full((8, 2), np.inf), "finite"),
-        (CUBE * 0, [[0, 1, 2]], None, "all vertices are at one position"),
-    ],
-)
-def test_meshes_that_cannot_be_made(
-    vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike | None, reason: str
-) -> None:
-    with pytest.raises(ValueError, match=reason):
-        make_mesh(vertices, triangles, uvs)
-
-
-def test_turning_up_is_a_rotation_that_takes_y_to_z() -> None:
-    turned = shapes.turned_up(np.eye(3))
-    np.testing.assert_array_equal(turned, [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
-    assert np.linalg.det(turned) == pytest.approx(1.0)
-
-
-def test_texture_stretch_is_the_ratio_of_the_sides_of_a_drawn_out_square() -> None:
-    plane = shapes.square(4)
-    for factor in (1.0, 2.0, 5.0):
-        drawn = plane.vertices * [factor, 1.0, 1.0]
-        found = shapes.texture_stretch(drawn, plane.triangles, plane.uvs)
-        assert found == pytest.approx(factor)
-    flat = shapes.texture_stretch(plane.vertices, plane.triangles, np.zeros_like(plane.uvs))
-    assert flat == np.inf

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.geometry import shapes
+from pipelines.geometry.meshes import vertex_normals
 from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
 from pipelines.ssdf_lighting.distances.signed_distance import (
@@ -59,7 +60,7 @@ def test_sampled_rows_are_runs_from_end_to_end(count: int, wanted: int) -> None:
 
 def test_visibility_is_tested_by_another_method_and_faults_are_found() -> None:
     ball = shapes.sphere(10)
-    around = ball.vertices, ball.triangles, shapes.vertex_normals(ball.vertices, ball.triangles)
+    around = ball.vertices, ball.triangles, vertex_normals(ball.vertices, ball.triangles)
     rays = build_scene(ball.vertices, ball.triangles)
     origins = ray_origins(rays, *around)
     visible = visible_directions(rays, origins, WAYS)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.geometry import shapes
-from pipelines.geometry.repair import connected, edges
+from pipelines.geometry.mesh_edges import connected_components, mesh_edges
 from pipelines.ssdf_lighting.light.microfacets import Materials, check_materials
 from pipelines.ssdf_lighting.scene import (
     SCENES,
@@ -111,7 +111,7 @@ def test_walls_of_the_court_are_closed_and_face_outwards(court: Scene) -> None:
     back, back_counts = np.unique(directed[:, ::-1], axis=0, return_counts=True)
     np.testing.assert_array_equal(there, back)
     np.testing.assert_array_equal(counts, back_counts)
-    piece = connected(edges(walls).pairs() // 3, len(walls))
+    piece = connected_components(mesh_edges(walls).pairs() // 3, len(walls))
     for number in range(int(piece.max()) + 1):
         own = walls[piece == number]
         assert signed_volume(vertices - vertices[own[0, 0]], own) > 0

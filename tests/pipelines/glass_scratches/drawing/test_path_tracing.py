@@ -12,7 +12,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera, orbit
-from pipelines.geometry.solids import Solid, glass_teapot, plate
+from pipelines.geometry.solid_shapes import glass_teapot, plate
+from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing import path_tracing
 from pipelines.glass_scratches.drawing.path_events import Surface, lean_factor, reflectance
 from pipelines.glass_scratches.drawing.path_tracing import Picture, Strategy, make_surface, trace

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.clustering import k_means_from_farthest
 from pipelines.geometry import shapes
-from pipelines.geometry.repair import repair
+from pipelines.geometry.repair import repair_mesh
 from pipelines.ssdf_lighting.compression.triangle_clusters import (
     Clusters,
     clusters_by_distance,
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 @pytest.fixture(scope="module")
 def ball() -> tuple[Floats, NDArray[np.int32]]:
     mesh = shapes.sphere(16)
-    mended = repair(mesh.vertices, mesh.triangles)
+    mended = repair_mesh(mesh.vertices, mesh.triangles)
     return mended.vertices, mended.triangles
 
 

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.geometry import shapes
+from pipelines.geometry.meshes import vertex_normals
 from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.distances.visibility import (
@@ -369,7 +370,7 @@ def test_dark_corners_that_are_not_inside_keep_what_they_see() -> None:
 
 def test_where_all_or_none_are_buried_each_keeps_its_own() -> None:
     ball = shapes.sphere(8)
-    around = ball.vertices, ball.triangles, shapes.vertex_normals(ball.vertices, ball.triangles)
+    around = ball.vertices, ball.triangles, vertex_normals(ball.vertices, ball.triangles)
     rays = build_scene(ball.vertices, ball.triangles)
     origins = ray_origins(rays, *around)
     count = len(ball.vertices)

@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Camera
-from pipelines.geometry.shapes import Mesh, square
+from pipelines.geometry.meshes import Mesh
+from pipelines.geometry.shapes import square
 from pipelines.ssdf_lighting.drawing.ray_traced import Traced, ray_traced
 from pipelines.ssdf_lighting.light.microfacets import gloss
 from pipelines.ssdf_lighting.light.shading import Materials
