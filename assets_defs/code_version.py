@@ -50,7 +50,7 @@ class Code(NamedTuple):
     names: tuple[str, ...]
     """Names that stand in it; of a whole file: none."""
     reaches: tuple[str, ...]
-    """Modules of the hashed packages that it imports, and shaders that it names."""
+    """What it imports of the hashed packages, modules or not, and shaders that it names."""
     from_assets: tuple[str, ...]
     """``module:name`` of what it imports from modules of assets."""
 
@@ -110,12 +110,12 @@ def _is_constant(value: object) -> bool:
 
 @functools.cache
 def _reached(name: str) -> frozenset[str]:
-    """A module or shader and all that it reaches."""
+    """A module or shader and all that it reaches; nothing where the name is neither's."""
     reached: set[str] = set()
     waiting = [name]
     while waiting:
         module = waiting.pop()
-        if module not in reached:
+        if module not in reached and _path(module) is not None:
             reached.add(module)
             waiting.extend(_module(module).reaches)
     return frozenset(reached)
@@ -162,7 +162,7 @@ def _code(tree: ast.AST) -> Code:
     nodes = list(ast.walk(tree))
     names = dict.fromkeys(node.id for node in nodes if isinstance(node, ast.Name))
     texts = [str(node.value) for node in nodes if isinstance(node, ast.Constant)]
-    shaders = [text for text in texts if _is_shader(text)]
+    shaders = [text for text in texts if text.endswith(".glsl")]
     reaches = tuple(dict.fromkeys([*_imports(tree), *shaders]))
     from_assets = (
         f"{node.module}:{alias.name}"
@@ -176,16 +176,12 @@ def _code(tree: ast.AST) -> Code:
 def _shader(text: str) -> Code:
     plain = _COMMENT.sub("", text)
     lines = "\n".join(line.strip() for line in plain.splitlines() if line.strip())
-    includes = [name for name in _INCLUDE.findall(plain) if _is_shader(name)]
-    return Code(hashlib.sha256(lines.encode()).hexdigest(), (), tuple(includes), ())
-
-
-def _is_shader(text: str) -> bool:
-    return text.endswith(".glsl") and (SHADERS / text).is_file()
+    includes = tuple(_INCLUDE.findall(plain))
+    return Code(hashlib.sha256(lines.encode()).hexdigest(), (), includes, ())
 
 
 def _imports(tree: ast.AST) -> Iterator[str]:
-    """Dotted names of the hashed packages' modules that a tree imports."""
+    """Dotted names that a tree imports of the hashed packages: modules, or what is in them."""
     for node in ast.walk(tree):
         names: list[str] = []
         if isinstance(node, ast.Import):
@@ -193,15 +189,14 @@ def _imports(tree: ast.AST) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         for name in names:
-            if name.startswith(_HASHED_PACKAGES) and _path(name) is not None:
+            if name.startswith(_HASHED_PACKAGES):
                 yield name
 
 
+@functools.cache
 def _path(name: str) -> Path | None:
-    if _is_shader(name):
-        return SHADERS / name
     base = PROJECT.joinpath(*name.split("."))
-    for path in (base.with_suffix(".py"), base / "__init__.py"):
+    for path in (SHADERS / name, base.with_suffix(".py"), base / "__init__.py"):
         if path.is_file():
             return path
     return None
