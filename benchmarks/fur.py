@@ -23,7 +23,6 @@ from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance
 from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
-from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
 from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
 from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse

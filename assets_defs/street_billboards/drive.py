@@ -201,7 +201,7 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
     import xarray as xr
 
     from pipelines.drawing.colour import to_8bit
-    from pipelines.geometry.cameras import lateral
+    from pipelines.geometry.cameras import moved_left
     from pipelines.virtual.city.city import city
     from pipelines.virtual.city.photographing import CityStage
     from pipelines.virtual.city.simulated_drive import photograph, plan_drive
@@ -238,7 +238,7 @@ def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Re
                 if labels:
                     truth_depth.append(shot.depth)
                     truth_pole.append(shot.pole)
-                    moved = [stage.shoot(lens, lateral(pose, offset)) for offset in OFFSETS]
+                    moved = [stage.shoot(lens, moved_left(pose, offset)) for offset in OFFSETS]
                     beside.append([to_8bit(EXPOSURE * one.radiance) for one in moved])
             progress(0.1 + 0.9 * (frame + 1) / frames)
     dataset = xr.Dataset(

@@ -153,7 +153,7 @@ def street_frames(
     import xarray as xr
 
     from pipelines.drawing.colour import to_8bit
-    from pipelines.geometry.cameras import lateral
+    from pipelines.geometry.cameras import moved_left
     from pipelines.street_billboards import figures
     from pipelines.street_billboards.drawing import frames
 
@@ -166,7 +166,7 @@ def street_frames(
     truth = drive_frames["photographs"].isel(frame=kept, camera=middle).values
     size = (drive_frames.sizes["x"], drive_frames.sizes["y"])
     held = poses[kept]
-    beside = [lateral(pose, offset) for pose in held for offset in OFFSETS]
+    beside = [moved_left(pose, offset) for pose in held for offset in OFFSETS]
     flight = frames.flight(poses[_UNSEEN:], settings.flight_frames, settings.swerve)
     with frames.StreetStage(
         made, pages_of(texture_atlases), sky, size, supersampling=settings.supersampling

@@ -311,11 +311,11 @@ def _frames_that_see(
     """Frames of which some camera has some voxel before it, not too far away."""
     import numpy as np
 
-    from pipelines.geometry.cameras import projected
+    from pipelines.geometry.cameras import project_points
 
     seen = np.zeros(len(cameras.to_world), bool)
     for number, pose in enumerate(cameras.to_world):
-        depth = projected(cameras.intrinsics[number], pose, voxels)[1]
+        depth = project_points(cameras.intrinsics[number], pose, voxels)[1]
         away = np.linalg.norm(voxels - pose[:3, 3], axis=1)
         seen[number] = bool(((depth > 0) & (away < farthest)).any())
     return np.flatnonzero(seen.reshape(frames, -1).any(axis=1))

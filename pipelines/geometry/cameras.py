@@ -25,7 +25,7 @@ class Cameras(NamedTuple):
     height: int
 
 
-def projected(
+def project_points(
     intrinsics: FloatArray, to_world: FloatArray, points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Pixels (…, 2) and depths (…,) along the optical axis, in metres, of points (…, 3).
@@ -41,7 +41,7 @@ def projected(
     return np.stack([across, down], axis=-1), depth
 
 
-def points_at(
+def unproject_depth(
     intrinsics: FloatArray, to_world: FloatArray, depth: NDArray[np.floating]
 ) -> FloatArray:
     """World positions (y, x, 3) of a depth map (y, x) in metres along the optical axis."""
@@ -54,7 +54,7 @@ def points_at(
     return (rays * depth[..., None]) @ to_world[:3, :3].T + to_world[:3, 3]
 
 
-def lateral(to_world: FloatArray, offset: float) -> FloatArray:
+def moved_left(to_world: FloatArray, offset: float) -> FloatArray:
     """A camera's pose (4, 4) moved to its left by ``offset`` metres."""
     moved = np.array(to_world, np.float64)
     moved[:3, 3] -= offset * moved[:3, 0]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.cameras import Cameras, projected
+from pipelines.geometry.cameras import Cameras, project_points
 from pipelines.street_billboards.octree import Leaves, neighbours
 from pipelines.street_billboards.textures.view_directions import CIRCLE, DIRECTIONS, SPACING
 
@@ -111,7 +111,7 @@ def _towards_viewers(middle: NDArray[np.float64], cameras: Cameras) -> NDArray[n
     """Unit vectors (b, 3) to the cameras that have it in their picture, the near ones above all."""
     total = np.zeros_like(middle)
     for intrinsics, to_world in zip(cameras.intrinsics, cameras.to_world, strict=True):
-        pixels, depth = projected(intrinsics, to_world, middle)
+        pixels, depth = project_points(intrinsics, to_world, middle)
         offset = to_world[:3, 3] - middle
         away = np.maximum(np.linalg.norm(offset, axis=1), _NEAREST)
         with np.errstate(invalid="ignore"):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 
 Picture = NDArray[np.uint8]
 
@@ -102,7 +102,7 @@ def stray_share(
     asked = strays = 0
     _, height, width = truths.shape
     for pose, truth in zip(poses, truths, strict=True):
-        pixels, depth = projected(intrinsics, pose, np.asarray(positions, np.float64))
+        pixels, depth = project_points(intrinsics, pose, np.asarray(positions, np.float64))
         before = (depth > 1.0) & (depth < _FARTHEST)
         x, y = np.rint(pixels[before]).astype(np.int64).T
         inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)

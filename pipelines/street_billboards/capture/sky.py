@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb
-from pipelines.geometry.cameras import points_at
+from pipelines.geometry.cameras import unproject_depth
 
 FloatArray = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ def sky_along(sky: NDArray[np.float32], rays: FloatArray) -> NDArray[np.float32]
 
 def rays_of(intrinsics: FloatArray, to_world: FloatArray, width: int, height: int) -> FloatArray:
     """Unit vectors (height, width, 3) in the world along which a camera's pixels look."""
-    rays = points_at(intrinsics, to_world, np.ones((height, width))) - to_world[:3, 3]
+    rays = unproject_depth(intrinsics, to_world, np.ones((height, width))) - to_world[:3, 3]
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.billboards import Billboards, turned_axes
 from pipelines.street_billboards.capture.point_fusion import FrameViews
 from pipelines.street_billboards.textures.atlases import Page
@@ -54,7 +54,7 @@ def sampling_error(
                 across, up = turned_axes(billboards.centre[number], pose[:3, 3])
                 row, column = across * row[0], up * column[2]
             points = billboards.centre[number] + s[..., None] * row + t[..., None] * column
-            pixels, depth = projected(photographs.intrinsics[k], pose, points[seen])
+            pixels, depth = project_points(photographs.intrinsics[k], pose, points[seen])
             x, y = np.rint(np.nan_to_num(pixels, nan=-9.0)).clip(-9, 1e6).astype(np.int64).T
             shown = (depth > 0.3) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
             there = codes[k][photographs.photographs[k, y * shown, x * shown], np.arange(3)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.capture.point_fusion import FrameViews
 
 MOST_POINTS = 20_000
@@ -36,7 +36,9 @@ def observed(positions: NDArray[np.float64], views: FrameViews, *, farthest: flo
     _, height, width = views.depth.shape
     found = []
     for number, picture in enumerate(views.photographs):
-        pixels, depth = projected(views.intrinsics[number], views.poses[number], positions[points])
+        pixels, depth = project_points(
+            views.intrinsics[number], views.poses[number], positions[points]
+        )
         near = (depth > 0.5) & (depth < farthest)
         pixels = np.where(near[:, None], pixels, -9.0)
         x, y = np.rint(pixels).astype(np.int64).T

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
-from pipelines.geometry.cameras import lateral
+from pipelines.geometry.cameras import moved_left
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def plan_drive(
     heading = np.arctan(_SWAY * turn * np.cos(turn * x + phase))
     car = np.stack([_pose(*row, camera_height) for row in zip(x, y, heading, strict=True)])
     offsets = (baseline, 0.0, -baseline)
-    poses = np.stack([[lateral(pose, offset) for offset in offsets] for pose in car])
+    poses = np.stack([[moved_left(pose, offset) for offset in offsets] for pose in car])
     focal = width / (2.0 * np.tan(np.radians(view_angle) / 2.0))
     camera = [[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]]
     own = 1.0 + _CAMERA_GAINS * generator.uniform(-1.0, 1.0, 3)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.drawing.colour import encode_srgb
-from pipelines.geometry.cameras import points_at
+from pipelines.geometry.cameras import unproject_depth
 from pipelines.street_billboards.figures import (
     bad_pixel_share,
     depth_error,
@@ -256,7 +256,7 @@ def test_stray_points_are_those_before_the_surface() -> None:
 def test_true_depth_maps_have_no_strays() -> None:
     lens, pose = placed_camera((1.0, -8.0, 2.0), (0, 0, 0), (30, 20), 25.0)
     depth = np.random.default_rng(1).uniform(2, 19, (20, 30))
-    points = points_at(lens, pose, depth).reshape(-1, 3)
+    points = unproject_depth(lens, pose, depth).reshape(-1, 3)
     assert stray_share(points, lens, pose[None], depth[None]) == 0.0
     y, x = np.mgrid[:20, :30]
     forward = np.where(((x + y) % 3 == 0)[..., None], 0.9, 1.0).reshape(-1, 1)

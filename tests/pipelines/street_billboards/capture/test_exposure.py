@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
-from pipelines.geometry.cameras import points_at
+from pipelines.geometry.cameras import unproject_depth
 from pipelines.street_billboards.capture.exposure import evening_codes, exposure_gains
 from pipelines.street_billboards.capture.point_fusion import FrameViews
 from pipelines.street_billboards.textures.observations import Observations, observed
@@ -124,7 +124,7 @@ def test_observed_by_brute_force() -> None:
     pictures = rng.integers(0, 256, (3, height, width, 3), dtype=np.uint8)
     views = FrameViews(depth, deviation, pictures, np.stack(lenses), np.stack(poses))
     # Half of them near what the depth maps say, half anywhere, behind cameras too.
-    near = points_at(lenses[1], poses[1], np.nan_to_num(depth[1], nan=5.0)).reshape(-1, 3)
+    near = unproject_depth(lenses[1], poses[1], np.nan_to_num(depth[1], nan=5.0)).reshape(-1, 3)
     points = np.concatenate([near + rng.normal(0, 0.3, near.shape), rng.uniform(-12, 12, (300, 3))])
     found = observed(points, views, farthest=farthest)
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, to_8bit
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.capture.sky import SkyView, rays_of, sky_along, sky_map, sky_pixels
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
@@ -64,7 +64,7 @@ def test_the_map_is_the_panorama(height: int) -> None:
     ways = directions(height)
     shown = np.zeros(ways.shape[:2], bool)
     for view, sky in shots:
-        pixels, depth = projected(view.intrinsics, view.to_world, ways)
+        pixels, depth = project_points(view.intrinsics, view.to_world, ways)
         x, y = np.moveaxis(np.rint(pixels).clip(-1, 400).astype(int), -1, 0)
         inside = (depth > 0) & (x > 2) & (x < WIDTH - 3) & (y > 2) & (y < HEIGHT - 3)
         far_from_houses = cv2.erode(sky.astype(np.uint8), np.ones((31, 31), np.uint8)) > 0
@@ -135,7 +135,7 @@ def test_rays_are_unit_vectors_through_the_pixels() -> None:
     lens, pose = placed_camera((3.0, 1.0, 2.0), (0.0, 4.0, 5.0), (20, 14), 15.0)
     rays = rays_of(lens, pose, 20, 14)
     np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0)
-    pixels, depth = projected(lens, pose, pose[:3, 3] + 7.0 * rays)
+    pixels, depth = project_points(lens, pose, pose[:3, 3] + 7.0 * rays)
     assert (depth > 0).all()
     np.testing.assert_allclose(
         pixels, np.stack(np.meshgrid(np.arange(20), np.arange(14)), axis=-1), atol=1e-9

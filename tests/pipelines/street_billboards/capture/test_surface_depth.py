@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.capture.surface_depth import surface_depth
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
@@ -22,7 +22,7 @@ def test_splats_by_brute_force(seed: int, size: float) -> None:
     points = rng.uniform(-6, 6, (60, 3))
     found = surface_depth(points, size, lens, pose, WIDTH, HEIGHT, farthest=7.0)
     expected = np.full((HEIGHT, WIDTH), np.inf)
-    pixels, depth = projected(lens, pose, points)
+    pixels, depth = project_points(lens, pose, points)
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     for (across, down), z in zip(pixels, depth, strict=True):
         if 0.3 <= z <= 7.0:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Stage
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.billboards import Billboards, turned_axes
 from pipelines.street_billboards.drawing import stage_view
 from pipelines.street_billboards.drawing.culling import NEAR, visible
@@ -143,7 +143,7 @@ def test_a_turning_square_faces_the_eye(street: Any, place: tuple[float, ...]) -
     _, covered = picture(street(square, textures), intrinsics, pose)
     row, column = turned_axes(square.centre[0], eye)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.4 @ np.stack([row, column])
-    pixels, _ = projected(intrinsics, pose, corners)
+    pixels, _ = project_points(intrinsics, pose, corners)
     expected = inside(pixels, SIZE)
     assert expected.sum() > 300
     assert (covered != expected).sum() <= 6
@@ -249,7 +249,7 @@ def test_culling_against_points_of_the_rectangles() -> None:
     half_t = np.where(turns, column * placed.half_t[:, 2:], placed.half_t)
     steps = np.linspace(-1, 1, 15)
     s, t = (grid.ravel()[:, None, None] for grid in np.meshgrid(steps, steps))
-    pixels, depth = projected(intrinsics, pose, placed.centre + s * half_s + t * half_t)
+    pixels, depth = project_points(intrinsics, pose, placed.centre + s * half_s + t * half_t)
     shown = (depth >= NEAR) & (pixels >= -0.5).all(axis=-1)
     shown &= (pixels <= np.array(SIZE) - 0.5).all(axis=-1)
     shows = shown.any(axis=0)

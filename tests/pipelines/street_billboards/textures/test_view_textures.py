@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.geometry.cameras import projected
+from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.billboards import OVERLAP, turned_axes
 from pipelines.street_billboards.capture.exposure import evening_codes
 from pipelines.street_billboards.textures.forms import EMPTY, SEEN, SIDE, UNSEEN, joined
@@ -97,7 +97,9 @@ def test_outside_of_pictures_nothing_is_known() -> None:
     wall = on_the_wall()
     photographs = Scene().photographs([(0.0, -5.0, 0.1)], target=(0.7, 0.0, 0.2), size=(50, 44))
     found = view_textures(wall, VOXEL, photographs)
-    pixels, _ = projected(photographs.intrinsics[0], photographs.to_world[0], texel_points(wall, 0))
+    pixels, _ = project_points(
+        photographs.intrinsics[0], photographs.to_world[0], texel_points(wall, 0)
+    )
     inside = (np.abs(pixels - [24.5, 21.5]) < [25, 22]).all(axis=-1)
     assert 0.1 < inside.mean() < 0.9
     np.testing.assert_array_equal(found.states[0], np.where(inside, SEEN, UNSEEN))
@@ -187,7 +189,7 @@ def test_what_turns_is_seen_only_where_depth_lies_in_the_voxel(deviation: float)
             for x in range(SIDE):
                 s, t = (2 * x + 1) / SIDE - 1, 1 - (2 * y + 1) / SIDE
                 point = tree.centre[0] + half * (s * row + t * column)
-                pixel, z = projected(photographs.intrinsics[k], photographs.to_world[k], point)
+                pixel, z = project_points(photographs.intrinsics[k], photographs.to_world[k], point)
                 u, v = (int(i) for i in np.floor(pixel + 0.5))
                 # The stretch of the ray inside the voxel, by trying.
                 tried = np.linspace(0.5, 1.5, 2001)
@@ -215,7 +217,9 @@ def test_views_that_show_little_are_dropped() -> None:
     # One camera sees all of the wall, another beside it the left sixth of it.
     photographs = Scene().photographs([(0.0, -5.0, 0.0), (-3.0, -4.0, 0.0)])
     wall = on_the_wall()
-    pixels, _ = projected(photographs.intrinsics[1], photographs.to_world[1], texel_points(wall, 0))
+    pixels, _ = project_points(
+        photographs.intrinsics[1], photographs.to_world[1], texel_points(wall, 0)
+    )
     border = np.quantile(pixels[..., 0], 1 / 6)
     photographs.depth[1, :, int(border) :] = 1.0
     found = view_textures(wall, VOXEL, photographs)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipelines.geometry.cameras import lateral, points_at
+from pipelines.geometry.cameras import moved_left, unproject_depth
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.virtual.city.city import BEFORE, BEYOND, City, city
 from pipelines.virtual.city.light import sky_visibility
@@ -181,10 +181,10 @@ def test_repeatable_pictures_have_no_seam(photographs: Photographs) -> None:
 
 def test_depth_and_poles_are_those_of_rays(short: City, photographs: Photographs) -> None:
     drive = plan_drive(4, 3.0, WIDTH, HEIGHT)
-    k, pose = drive.intrinsics[0], lateral(drive.poses[2, 1], 0.4)
+    k, pose = drive.intrinsics[0], moved_left(drive.poses[2, 1], 0.4)
     with CityStage(short, photographs, WIDTH, HEIGHT) as stage:
         shot = stage.shoot(k, pose, labels=True)
-    ways = points_at(k, pose, np.ones((HEIGHT, WIDTH))) - pose[:3, 3]
+    ways = unproject_depth(k, pose, np.ones((HEIGHT, WIDTH))) - pose[:3, 3]
     scene = build_scene(short.vertices, short.triangles)
     hits = first_hits(scene, pose[:3, 3], ways.reshape(-1, 3))
     expected = hits.distance.reshape(HEIGHT, WIDTH)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.drawing.colour import decode_srgb, to_8bit
-from pipelines.geometry.cameras import lateral, projected
+from pipelines.geometry.cameras import moved_left, project_points
 from pipelines.virtual.city.simulated_drive import photograph, plan_drive
 
 
@@ -43,14 +43,14 @@ def test_cameras_are_in_a_row_from_left_to_right() -> None:
         np.testing.assert_allclose(np.linalg.norm(left - middle), 0.6)
         assert left[1] > middle[1]
         np.testing.assert_allclose((left - middle) @ poses[1, :3, 2], 0.0, atol=1e-12)
-        np.testing.assert_allclose(lateral(poses[1], 0.6), poses[0])
+        np.testing.assert_allclose(moved_left(poses[1], 0.6), poses[0])
 
 
 def test_what_is_at_the_left_is_at_the_left_of_the_picture() -> None:
     drive = plan_drive(1, 3.0, 640, 400)
     k, pose = drive.intrinsics[1], drive.poses[0, 1]
     ahead = pose[:3, 3] + 10 * pose[:3, 2]
-    pixel, depth = projected(k, pose, ahead + np.array([0.0, 1.0, 0.5]))
+    pixel, depth = project_points(k, pose, ahead + np.array([0.0, 1.0, 0.5]))
     assert depth == pytest.approx(10.0, abs=0.1)
     assert pixel[0] < 319.5
     assert pixel[1] < 199.5
