@@ -15,7 +15,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture.point_support import alike, confirmed
+from pipelines.street_billboards.capture.multi_view_consistency import (
+    DepthView,
+    GreyView,
+    OtherDepthViews,
+    OtherGreyViews,
+    geometric_consistency,
+    photometric_consistency,
+)
 
 FloatArray = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -80,18 +87,17 @@ def consistent_points(
     parts = []
     for i in range(len(frame.depth)):
         others = _others(neighbours, frame, i)
-        positions, normals, weight = confirmed(
-            _contiguous(frame.depth[i]),
-            _contiguous(frame.deviation[i]),
-            _lenses(frame.intrinsics[i : i + 1])[0],
-            np.ascontiguousarray(frame.poses[i], dtype=np.float64),
+        lens, to_world = _camera(frame, i)
+        view = DepthView(
+            _contiguous(frame.depth[i]), _contiguous(frame.deviation[i]), lens, to_world
+        )
+        asked = OtherDepthViews(
             _contiguous(neighbours.depth[others]),
             _contiguous(neighbours.deviation[others]),
-            _lenses(neighbours.intrinsics[others]),
-            np.linalg.inv(np.asarray(neighbours.poses[others], np.float64)),
-            least_support,
-            farthest,
-            step,
+            *_cameras(neighbours, others),
+        )
+        positions, normals, weight = geometric_consistency(
+            view, asked, least_support, farthest, step
         )
         kept = weight > 0
         colours = frame.photographs[i, ::step, ::step][kept]
@@ -109,16 +115,13 @@ def agreement(frame: FrameViews, neighbours: FrameViews) -> float:
     greys = neighbours.photographs.mean(axis=-1, dtype=np.float32)
     for i in range(len(frame.depth)):
         others = _others(neighbours, frame, i)
-        counts = alike(
-            _contiguous(frame.depth[i]),
-            frame.photographs[i].mean(axis=-1, dtype=np.float32),
-            _lenses(frame.intrinsics[i : i + 1])[0],
-            np.ascontiguousarray(frame.poses[i], dtype=np.float64),
-            _contiguous(neighbours.depth[others]),
-            greys[others],
-            _lenses(neighbours.intrinsics[others]),
-            np.linalg.inv(np.asarray(neighbours.poses[others], np.float64)),
+        lens, to_world = _camera(frame, i)
+        grey = frame.photographs[i].mean(axis=-1, dtype=np.float32)
+        view = GreyView(_contiguous(frame.depth[i]), grey, lens, to_world)
+        beside = OtherGreyViews(
+            _contiguous(neighbours.depth[others]), greys[others], *_cameras(neighbours, others)
         )
+        counts = photometric_consistency(view, beside)
         asked += counts[0]
         agree += counts[1]
     return agree / asked if asked else 0.0
@@ -131,6 +134,18 @@ def _others(views: FrameViews, frame: FrameViews, camera: int) -> NDArray[np.int
     ahead = frame.poses[camera, :3, 3] + _AHEAD * frame.poses[camera, :3, 2]
     away = np.linalg.norm(views.poses[others, :3, 3] - ahead, axis=1)
     return others[np.argsort(away, kind="stable")]
+
+
+def _camera(views: FrameViews, number: int) -> tuple[FloatArray, FloatArray]:
+    """Lens (4,) and pose (4, 4) of one."""
+    pose = np.ascontiguousarray(views.poses[number], dtype=np.float64)
+    return _lenses(views.intrinsics[number : number + 1])[0], pose
+
+
+def _cameras(views: FrameViews, chosen: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Lenses (k, 4) and what takes the world to the cameras' axes (k, 4, 4)."""
+    poses = np.asarray(views.poses[chosen], np.float64)
+    return _lenses(views.intrinsics[chosen]), np.linalg.inv(poses)
 
 
 def _lenses(intrinsics: FloatArray) -> FloatArray:

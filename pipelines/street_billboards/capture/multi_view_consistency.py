@@ -1,11 +1,13 @@
-"""What other depth maps say of a depth map's points: kernels.
+"""Multi-view consistency: what other views' depth maps and photographs say of one view's pixels.
 
-A camera is given as a lens (fx, fy, cx, cy) in pixels and a matrix (4, 4), to the world for the one
-whose points are asked about, from the world for those that are asked. Depths are metres along the
+Geometric: the same depth where a point is projected, and nothing looks through it. Photometric: it
+looks alike there as well. A lens is (fx, fy, cx, cy) in pixels. Depths are metres along a camera's
 axis; nan: unknown, inf: sky.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -38,82 +40,147 @@ _ALIKE = 0.6
 """Correlation of patches that look alike."""
 
 
+class DepthView(NamedTuple):
+    """The view whose pixels are asked about."""
+
+    depth: Map
+    """(h, w)."""
+    deviation: Map
+    """(h, w), standard deviation, m."""
+    lens: FloatArray
+    """(4,)."""
+    to_world: FloatArray
+    """(4, 4)."""
+
+
+class OtherDepthViews(NamedTuple):
+    """The k views that are asked, those first that know most."""
+
+    depth: Map
+    """(k, h, w)."""
+    deviation: Map
+    """(k, h, w), standard deviation, m."""
+    lens: FloatArray
+    """(k, 4)."""
+    from_world: FloatArray
+    """(k, 4, 4)."""
+
+
+class GreyView(NamedTuple):
+    """The view whose patches are compared."""
+
+    depth: Map
+    """(h, w)."""
+    grey: Map
+    """(h, w), 0 to 255."""
+    lens: FloatArray
+    """(4,)."""
+    to_world: FloatArray
+    """(4, 4)."""
+
+
+class OtherGreyViews(NamedTuple):
+    """The k views that they are compared with; or one of them, without the first axis."""
+
+    depth: Map
+    """(k, h, w)."""
+    grey: Map
+    """(k, h, w), 0 to 255."""
+    lens: FloatArray
+    """(k, 4)."""
+    from_world: FloatArray
+    """(k, 4, 4)."""
+
+
+# ---- geometric -------------------------------------------------------------------------------
+
+
 @njit(cache=True, nogil=True)
-def confirmed(
-    depth: Map,
-    deviation: Map,
-    lens: FloatArray,
-    pose: FloatArray,
-    depths: Map,
-    deviations: Map,
-    lenses: FloatArray,
-    to_views: FloatArray,
-    support: int,
-    farthest: float,
-    step: int,
+def geometric_consistency(
+    view: DepthView, others: OtherDepthViews, least_support: int, farthest: float, step: int
 ) -> tuple[FloatArray, Map, Map]:
     """Positions (r, c, 3), normals (r, c, 3), inverse variances (r, c) of every step-th pixel.
 
-    Weight 0: fewer than ``support`` of the k views agree, or more than half as many look through
-    it. Along its ray, a point lies at the mean of all that agree, by inverse variance.
+    Weight 0: deeper than ``farthest``, fewer than ``least_support`` of the others agree, or more
+    than half as many look through it. Along its ray, a point lies at the mean of all that agree, by
+    inverse variance.
     """
-    height, width = depth.shape
+    height, width = view.depth.shape
     rows, columns = (height + step - 1) // step, (width + step - 1) // step
     found = np.zeros((rows, columns, 3))
     normals = np.zeros((rows, columns, 3), np.float32)
     weight = np.zeros((rows, columns), np.float32)
+    ray = np.empty((2, 3))
     for row in range(rows):
         for column in range(columns):
             y, x = row * step, column * step
-            z = np.float64(depth[y, x])
+            z = np.float64(view.depth[y, x])
             if not z <= farthest:
                 continue
-            across, down = (x - lens[2]) / lens[0], (y - lens[3]) / lens[1]
-            way_x = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
-            way_y = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
-            way_z = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
-            here_x, here_y = pose[0, 3] + way_x * z, pose[1, 3] + way_y * z
-            here_z = pose[2, 3] + way_z * z
-            variance = np.float64(deviation[y, x]) ** 2
-            certain = 1 / variance
-            moved = 0.0
-            agree = through = 0
-            for k in range(len(depths)):
-                m = to_views[k]
-                seen_z = m[2, 0] * here_x + m[2, 1] * here_y + m[2, 2] * here_z + m[2, 3]
-                if seen_z < _CLOSE:
-                    continue
-                seen_x = m[0, 0] * here_x + m[0, 1] * here_y + m[0, 2] * here_z + m[0, 3]
-                seen_y = m[1, 0] * here_x + m[1, 1] * here_y + m[1, 2] * here_z + m[1, 3]
-                u = seen_x / seen_z * lenses[k, 0] + lenses[k, 2]
-                v = seen_y / seen_z * lenses[k, 1] + lenses[k, 3]
-                most = _MOST_APART * seen_z
-                measured, spread = _depth_at(depths[k], deviations[k], u, v, seen_z, most)
-                if np.isnan(measured):
-                    continue
-                slope = m[2, 0] * way_x + m[2, 1] * way_y + m[2, 2] * way_z
-                apart = measured - seen_z
-                unsure = np.sqrt(spread**2 + variance * slope**2)
-                if abs(apart) <= min(_SURE * unsure + _FLOOR * seen_z, most):
-                    agree += 1
-                    # A view across the ray tells little of where along it.
-                    if abs(slope) > 0.5:
-                        share = (slope / spread) ** 2
-                        certain += share
-                        moved += share * apart / slope
-                    if agree >= _ENOUGH and through <= 1:
-                        break
-                elif apart > 0:
-                    through += 1
-            if agree < support or 2 * through > agree:
+            _set_ray(ray, view, x, y, z)
+            agree, through, moved, certain = _votes(
+                ray, np.float64(view.deviation[y, x]) ** 2, others
+            )
+            if agree < least_support or 2 * through > agree:
                 continue
             moved /= certain
-            found[row, column, 0] = here_x + way_x * moved
-            found[row, column, 1] = here_y + way_y * moved
-            found[row, column, 2] = here_z + way_z * moved
+            for axis in range(3):
+                found[row, column, axis] = ray[0, axis] + ray[1, axis] * moved
             weight[row, column] = 1 / (1 / certain + _LEAST_VARIANCE)
-            _set_normal(normals[row, column], depth, lens, pose, x, y)
+            _set_normal(normals[row, column], view, x, y)
     return found, normals, weight
+
+
+@njit(cache=True, nogil=True)
+def _set_ray(ray: FloatArray, view: DepthView, x: int, y: int, z: float) -> None:
+    """Rows of ``ray`` (2, 3): the pixel's point at depth z, and what a metre of depth adds."""
+    lens, pose = view.lens, view.to_world
+    across, down = (x - lens[2]) / lens[0], (y - lens[3]) / lens[1]
+    for i in range(3):
+        way = pose[i, 0] * across + pose[i, 1] * down + pose[i, 2]
+        ray[0, i], ray[1, i] = pose[i, 3] + way * z, way
+
+
+@njit(cache=True, nogil=True)
+def _votes(
+    ray: FloatArray, variance: float, others: OtherDepthViews
+) -> tuple[int, int, float, float]:
+    """How many views have the point, and look through it; where those that have it put it.
+
+    Along the ray, in metres of depth: the sum of offsets by inverse variance, and of these.
+    """
+    here_x, here_y, here_z = ray[0, 0], ray[0, 1], ray[0, 2]
+    certain = 1 / variance
+    moved = 0.0
+    agree = through = 0
+    for k in range(len(others.depth)):
+        m = others.from_world[k]
+        seen_z = m[2, 0] * here_x + m[2, 1] * here_y + m[2, 2] * here_z + m[2, 3]
+        if seen_z < _CLOSE:
+            continue
+        seen_x = m[0, 0] * here_x + m[0, 1] * here_y + m[0, 2] * here_z + m[0, 3]
+        seen_y = m[1, 0] * here_x + m[1, 1] * here_y + m[1, 2] * here_z + m[1, 3]
+        u = seen_x / seen_z * others.lens[k, 0] + others.lens[k, 2]
+        v = seen_y / seen_z * others.lens[k, 1] + others.lens[k, 3]
+        most = _MOST_APART * seen_z
+        measured, spread = _depth_at(others.depth[k], others.deviation[k], u, v, seen_z, most)
+        if np.isnan(measured):
+            continue
+        slope = m[2, 0] * ray[1, 0] + m[2, 1] * ray[1, 1] + m[2, 2] * ray[1, 2]
+        apart = measured - seen_z
+        unsure = np.sqrt(spread**2 + variance * slope**2)
+        if abs(apart) <= min(_SURE * unsure + _FLOOR * seen_z, most):
+            agree += 1
+            # A view across the ray tells little of where along it.
+            if abs(slope) > 0.5:
+                share = (slope / spread) ** 2
+                certain += share
+                moved += share * apart / slope
+            if agree >= _ENOUGH and through <= 1:
+                break
+        elif apart > 0:
+            through += 1
+    return agree, through, moved, certain
 
 
 @njit(cache=True, nogil=True)
@@ -149,10 +216,9 @@ def _depth_at(
 
 
 @njit(cache=True, nogil=True)
-def _set_normal(
-    normal: Map, depth: Map, lens: FloatArray, pose: FloatArray, x: int, y: int
-) -> None:
+def _set_normal(normal: Map, view: DepthView, x: int, y: int) -> None:
     """The depth map's normal at a pixel, from differences as far as its surface goes, at most 3."""
+    depth, lens, pose = view.depth, view.lens, view.to_world
     height, width = depth.shape
     z = np.float64(depth[y, x])
     slope_x = slope_y = 0.0
@@ -186,37 +252,32 @@ def _set_normal(
         normal[i] = -(pose[i, 0] * n0 + pose[i, 1] * n1 + pose[i, 2] * n2) / length
 
 
+# ---- photometric -----------------------------------------------------------------------------
+
+
 @njit(cache=True, nogil=True)
-def alike(
-    depth: Map,
-    grey: Map,
-    lens: FloatArray,
-    pose: FloatArray,
-    depths: Map,
-    greys: Map,
-    lenses: FloatArray,
-    to_views: FloatArray,
-) -> tuple[int, int]:
+def photometric_consistency(view: GreyView, others: OtherGreyViews) -> tuple[int, int]:
     """Of pairs of a textured pixel and a view that should see it: how many, how many confirm it.
 
     They do if the depth is the same within 4 % and the 5 x 5 pixels, each projected at its own
     depth, correlate. Depth alone would not do: a road and walls along the drive stay where they are
     when the focal length or the way driven is wrong, only what is painted on them slides.
     """
-    height, width = depth.shape
+    height, width = view.depth.shape
     asked = agree = 0
     for y in range(_PATCH, height - _PATCH, _APART):
         for x in range(_PATCH, width - _PATCH, _APART):
-            z = depth[y, x]
+            z = view.depth[y, x]
             if not z <= _FARTHEST:
                 continue
-            patch = grey[y - _PATCH : y + _PATCH + 1, x - _PATCH : x + _PATCH + 1]
+            patch = view.grey[y - _PATCH : y + _PATCH + 1, x - _PATCH : x + _PATCH + 1]
             if patch.var() < _LEAST_TEXTURE:
                 continue
-            for k in range(len(depths)):
-                measured, expected, correlation = _compared(
-                    depth, grey, lens, pose, depths[k], greys[k], lenses[k], to_views[k], x, y
+            for k in range(len(others.depth)):
+                other = OtherGreyViews(
+                    others.depth[k], others.grey[k], others.lens[k], others.from_world[k]
                 )
+                measured, expected, correlation = _patches_compared(view, other, x, y)
                 # Without a depth, or behind something, the view says nothing.
                 if not measured >= 0.9 * expected:
                     continue
@@ -227,23 +288,15 @@ def alike(
 
 
 @njit(cache=True, nogil=True)
-def _compared(
-    depth: Map,
-    grey: Map,
-    lens: FloatArray,
-    pose: FloatArray,
-    other_depth: Map,
-    other: Map,
-    other_lens: FloatArray,
-    m: FloatArray,
-    x: int,
-    y: int,
+def _patches_compared(
+    view: GreyView, other: OtherGreyViews, x: int, y: int
 ) -> tuple[float, float, float]:
     """A view's depth where it should see a pixel, the depth expected there, patches' correlation.
 
     nan for a depth that it does not know, or a patch not wholly in the picture.
     """
-    height, width = other.shape
+    depth, lens, pose, m = view.depth, view.lens, view.to_world, other.from_world
+    height, width = other.grey.shape
     z = depth[y, x]
     measured = expected = np.nan
     n = 0
@@ -262,19 +315,19 @@ def _compared(
                 return np.nan, w, 0.0
             u = (m[0, 0] * p0 + m[0, 1] * p1 + m[0, 2] * p2 + m[0, 3]) / w
             v = (m[1, 0] * p0 + m[1, 1] * p1 + m[1, 2] * p2 + m[1, 3]) / w
-            u = u * other_lens[0] + other_lens[2]
-            v = v * other_lens[1] + other_lens[3]
+            u = u * other.lens[0] + other.lens[2]
+            v = v * other.lens[1] + other.lens[3]
             if not (u >= 0 and v >= 0 and u < width - 1 and v < height - 1):
                 return np.nan, w, 0.0
             g, h = int(u), int(v)
             s, t = u - g, v - h
-            top = other[h, g] * (1 - s) + other[h, g + 1] * s
-            low = other[h + 1, g] * (1 - s) + other[h + 1, g + 1] * s
+            top = other.grey[h, g] * (1 - s) + other.grey[h, g + 1] * s
+            low = other.grey[h + 1, g] * (1 - s) + other.grey[h + 1, g + 1] * s
             theirs = top * (1 - t) + low * t
-            ours = np.float64(grey[y + j, x + i])
+            ours = np.float64(view.grey[y + j, x + i])
             if i == 0 and j == 0:
                 expected = w
-                measured = np.float64(other_depth[int(v + 0.5), int(u + 0.5)])
+                measured = np.float64(other.depth[int(v + 0.5), int(u + 0.5)])
             n += 1
             sum_a += ours
             sum_b += theirs
