@@ -17,7 +17,7 @@ from assets_defs.street_billboards.datasets import compressed_of, pages_of, view
 from assets_defs.street_billboards.graph import STREET
 from pipelines.street_billboards import billboards, figures, octree
 from pipelines.street_billboards.capture import exposure, point_fusion, stereo
-from pipelines.street_billboards.drawing import culling, frames, stage_view
+from pipelines.street_billboards.drawing import culling, frames, processor_street, quads
 from pipelines.street_billboards.textures import atlases, eigen_textures, view_textures
 from pipelines.street_billboards.textures.forms import SEEN
 from pipelines.virtual.city import simulated_drive
@@ -347,11 +347,11 @@ REGRESSIONS = (
     Regression("unpacked_error", atlases, "pages", _wrong_tile, KEYS),
     Regression("bytes_a_metre", atlases, "pages", _bytes(2.0, "bytes"), KEYS),
     Regression("padding_share", atlases, "pages", _bytes(1.0, "padding"), KEYS),
-    Regression("coverage", stage_view, "visible", _few_seen, KEYS),
+    Regression("coverage", quads, "visible", _few_seen, KEYS),
     Regression("held_out_psnr", figures, "match_exposure", _wrong_exposure, KEYS),
     Regression("held_out_ssim", figures, "match_exposure", _shaken, KEYS),
     Regression("held_out_flip", figures, "match_exposure", _shaken, KEYS),
-    Regression("shader_difference", stage_view, "decoded_views", _paler, KEYS),
+    Regression("shader_difference", processor_street, "decoded_views", _paler, KEYS),
 )
 
 

@@ -12,7 +12,9 @@ from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Stage
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.capture.sky import rays_of, sky_along
-from pipelines.street_billboards.drawing.stage_view import CpuStreet, Street, stage_camera
+from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
+from pipelines.street_billboards.drawing.shader_street import ShaderStreet
+from pipelines.street_billboards.drawing.stage_camera import stage_camera
 from pipelines.street_billboards.textures.atlases import Page
 from pipelines.street_billboards.textures.forms import CompressedTextures
 
@@ -48,7 +50,7 @@ class StreetStage:
         supersampling: int = 1,
     ) -> None:
         self._size = size
-        self._street = Street(billboards, pages)
+        self._street = ShaderStreet(billboards, pages)
         self._stage = Stage(*size, supersampling=supersampling)
         self._stage.add(*self._street.actors)
         self._sky = sky
@@ -102,7 +104,7 @@ def compared(
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """One picture (y, x, 3), decoded in the shader and by the processor."""
     pictures = []
-    for street in (Street(billboards, pages), CpuStreet(billboards, textures)):
+    for street in (ShaderStreet(billboards, pages), ProcessorStreet(billboards, textures)):
         with Stage(*size) as stage:
             street.look(intrinsics, to_world, *size)
             stage.add(*street.actors)

@@ -15,15 +15,12 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.stage import Camera, Shader, Stage, surface, texture
+from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.stage import Camera, Stage, surface, texture
 from pipelines.virtual.city.city import City
 from pipelines.virtual.city.materials import city_textures
 from pipelines.virtual.city.parts import MATERIALS, POSTERS
-from pipelines.virtual.city.reflections import (
-    Elevations,
-    reflection_glsl,
-    street_elevations,
-)
+from pipelines.virtual.city.reflections import shader_values, street_elevations
 from pipelines.virtual.city.sky import overcast_sky
 
 _CHUNK = 20.0
@@ -88,8 +85,13 @@ class CityStage:
                 part.triangles,
                 attributes={name: values[part.vertices] for name, values in attributes.items()},
                 textures=samplers,
-                shader=_shader(
-                    elevations if has_gloss else None, stained=material not in _UNSTAINED
+                shader=surface_shader(
+                    "city_vertex.glsl",
+                    "city_fragment.glsl",
+                    GLOSS=bool(has_gloss),
+                    STAINED=material not in _UNSTAINED,
+                    LEVEL_BIAS=_SHARPER,
+                    **shader_values(elevations),
                 ),
                 lit=False,
             )
@@ -222,38 +224,3 @@ def _repeated(image: NDArray[np.uint8]) -> Any:
     # is seen at a very grazing angle: instead, the shader takes sharper levels (_SHARPER).
     made.SetMaximumAnisotropicFiltering(1.0)
     return made
-
-
-# ---- shaders -----------------------------------------------------------------------------------
-
-
-def _shader(mirrored: Elevations | None, *, stained: bool) -> Shader:
-    declared = "in vec2 uv; in vec3 lit; out vec2 uvOut; out vec3 litOut;"
-    passed = "uvOut = uv; litOut = lit;"
-    taken = "in vec2 uvOut; in vec3 litOut;"
-    stains = " * (texture(stains, uvOut * 0.137).r * 2.5)" if stained else ""
-    code = "//VTK::Color::Impl\n"
-    code += f"  vec3 seen = texture(picture, uvOut, {_SHARPER}).rgb * litOut{stains};\n"
-    if mirrored is not None:
-        declared += (
-            " in vec3 shading; in float gloss; out vec3 shadingOut; out float glossOut;"
-            " out vec3 placeOut;"
-        )
-        passed += " shadingOut = shading; glossOut = gloss; placeOut = vertexMC.xyz;"
-        taken += " in vec3 shadingOut; in float glossOut; in vec3 placeOut;"
-        taken += reflection_glsl(mirrored)
-        code += _GLOSS
-    code += "  ambientColor = seen; diffuseColor = vec3(0.0);\n"
-    return Shader(
-        vertex={"TCoord::Dec": declared, "TCoord::Impl": passed},
-        fragment={"TCoord::Dec": taken, "Color::Impl": code},
-    )
-
-
-_GLOSS = """
-  vec3 away = normalize(placeOut - eye), normal = normalize(shadingOut);
-  float facing = clamp(-dot(away, normal), 0.0, 1.0);
-  vec3 mirrored = mirroredStreet(placeOut, reflect(away, normal));
-  float fresnel = 0.07 + 0.93 * pow(1.0 - facing, 5.0);
-  seen += fresnel * glossOut * mirrored;
-"""

@@ -61,22 +61,10 @@ def street_elevations(city: City, light: NDArray[np.floating]) -> Elevations:
     return Elevations(np.concatenate(halves), (start, low), (len(x) * _STEP, len(z) * _STEP))
 
 
-def reflection_glsl(elevations: Elevations) -> str:
-    """A GLSL function ``vec3 mirroredStreet(vec3 place, vec3 ray)``.
-
-    It wants samplers ``elevations`` and ``sky`` (equirectangular).
-    """
-    low, size = elevations.low, elevations.size
+def shader_values(elevations: Elevations) -> dict[str, list[float]]:
+    """Where the fronts lie in the picture: names in capitals of shaders/city_fragment.glsl."""
     inset = 1.0 / len(elevations.picture)
-    return f"""
-vec3 mirroredStreet(vec3 place, vec3 ray) {{
-  float side = ray.y < 0.0 ? -1.0 : 1.0;
-  float way = clamp((7.0 - side * place.y) / max(abs(ray.y), 1e-3), 0.0, 80.0);
-  vec3 hit = place + way * ray;
-  vec2 at = vec2((hit.x - {low[0]:.3f}) / {size[0]:.3f}, (hit.z - {low[1]:.3f}) / {size[1]:.3f});
-  at.y = 0.5 * clamp(at.y, {inset:.6f}, {1 - inset:.6f}) + (side > 0.0 ? 0.5 : 0.0);
-  vec4 front = textureLod(elevations, at, 0.0);
-  vec2 turned = vec2(0.5 - atan(ray.y, ray.x) * 0.15915494, 0.5 + asin(ray.z) * 0.31830989);
-  return front.rgb + (1.0 - front.a) * textureLod(sky, turned, 0.0).rgb;
-}}
-"""
+    return {
+        "ELEVATION_BOX": [round(value, 3) for value in (*elevations.low, *elevations.size)],
+        "ELEVATION_ROWS": [round(inset, 6), round(1 - inset, 6)],
+    }

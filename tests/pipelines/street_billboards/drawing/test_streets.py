@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from pipelines.drawing.stage import Stage
 from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.billboards import Billboards, turned_axes
-from pipelines.street_billboards.drawing import stage_view
+from pipelines.street_billboards.drawing import quads
 from pipelines.street_billboards.drawing.culling import NEAR, visible
-from pipelines.street_billboards.drawing.stage_view import CpuStreet, Street, stage_camera
+from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
+from pipelines.street_billboards.drawing.shader_street import ShaderStreet
+from pipelines.street_billboards.drawing.stage_camera import stage_camera
 from pipelines.street_billboards.textures.atlases import pages
 from pipelines.street_billboards.textures.decoding import decoded_views
 from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
@@ -46,7 +48,7 @@ def decoded(textures: CompressedTextures, billboard: int, position: float) -> ND
 
 
 def from_the_front(
-    textures: CompressedTextures, position: float, *, street: Any = Street
+    textures: CompressedTextures, position: float, *, street: Any = ShaderStreet
 ) -> Picture:
     """The first billboard, three pixels a texel, from this place in its fan."""
     turns = bool(np.diff(textures.first_mask)[0] > 1)
@@ -117,7 +119,7 @@ def test_a_neighbouring_tile_is_never_seen() -> None:
             for p in textures.planes
         )
         changed = textures._replace(planes=(planes[0], planes[1], planes[2]))
-        frames.append(picture(Street(square, changed), *camera, size=(100, 100))[0])
+        frames.append(picture(ShaderStreet(square, changed), *camera, size=(100, 100))[0])
     assert np.array_equal(frames[0], frames[1])
     assert frames[0].any()
 
@@ -132,7 +134,7 @@ def test_outlines_are_smooth_between_texels() -> None:
     assert (np.diff(widths[::3]) != 0).sum() < (np.diff(widths) != 0).sum()
 
 
-@pytest.mark.parametrize("street", [Street, CpuStreet])
+@pytest.mark.parametrize("street", [ShaderStreet, ProcessorStreet])
 @pytest.mark.parametrize("place", [(2, 0, 0), (-1, 2, 1), (0.3, -0.2, 2.5), (1, 1, -2), (3, 0, 1)])
 def test_a_turning_square_faces_the_eye(street: Any, place: tuple[float, ...]) -> None:
     textures = random_textures(TURNING, seed=7, ranks=(1, 1, 1), opaque=True)
@@ -178,15 +180,15 @@ def a_street(
 def test_shader_and_processor_draw_the_same(colour: str, tint_side: int) -> None:
     placed, textures = a_street(1500, 8, colour, tint_side)
     camera = placed_camera((0.5, -1.0, 0.3), (9, 2, 0), SIZE, 100.0)
-    mine, cover = picture(Street(placed, textures), *camera)
-    rival, rival_cover = picture(CpuStreet(placed, textures), *camera)
+    mine, cover = picture(ShaderStreet(placed, textures), *camera)
+    rival, rival_cover = picture(ProcessorStreet(placed, textures), *camera)
     assert (cover != rival_cover).sum() <= 10
     both = cover & rival_cover
     assert both.mean() > 0.3
     assert share_alike(mine[both], rival[both], 1) >= 0.995
 
 
-@pytest.mark.parametrize("street", [Street, CpuStreet])
+@pytest.mark.parametrize("street", [ShaderStreet, ProcessorStreet])
 def test_several_pages_draw_the_same_picture(street: Any) -> None:
     placed, textures = a_street(120, 9)
     camera = placed_camera((-9.0, -2.0, 0.3), (9, 2, 0), SIZE, 90.0)
@@ -203,11 +205,11 @@ def test_several_pages_draw_the_same_picture(street: Any) -> None:
 def test_packed_pages_are_drawn_like_textures() -> None:
     placed, textures = a_street(60, 10)
     camera = placed_camera((-9.0, -2.0, 0.3), (9, 2, 0), SIZE, 90.0)
-    frame, _ = picture(Street(placed, textures), *camera)
-    again, _ = picture(Street(placed, pages(textures)), *camera)
+    frame, _ = picture(ShaderStreet(placed, textures), *camera)
+    again, _ = picture(ShaderStreet(placed, pages(textures)), *camera)
     assert np.array_equal(frame, again)
     with pytest.raises(ValueError, match="found textures of 60 billboards; expected 61"):
-        Street(scattered(61), pages(textures))
+        ShaderStreet(scattered(61), pages(textures))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -222,15 +224,15 @@ def test_what_is_left_out_does_not_show(seed: int, monkeypatch: pytest.MonkeyPat
     towards *= rng.uniform(1.0, 1.8, (40, 1)) / np.linalg.norm(towards, axis=1, keepdims=True)
     placed.centre[:40] = eye + towards
     camera = placed_camera(eye, rng.uniform(-9, 9, 3), SIZE, 80.0)
-    sent = Street(placed, textures).look(*camera, *SIZE)
+    sent = ShaderStreet(placed, textures).look(*camera, *SIZE)
     assert 0 < sent < 450
-    frame, cover = picture(Street(placed, textures), *camera)
+    frame, cover = picture(ShaderStreet(placed, textures), *camera)
 
     def everything(placed: Billboards, *_: Any) -> NDArray[np.int64]:
         return np.argsort(np.linalg.norm(placed.centre - eye, axis=1))
 
-    monkeypatch.setattr(stage_view, "visible", everything)
-    whole, whole_cover = picture(Street(placed, textures), *camera)
+    monkeypatch.setattr(quads, "visible", everything)
+    whole, whole_cover = picture(ShaderStreet(placed, textures), *camera)
     assert np.array_equal(cover, whole_cover)
     # The stage's near and far planes are others, and so are depths and rounding.
     assert share_alike(frame, whole) >= 0.999
@@ -258,7 +260,7 @@ def test_culling_against_points_of_the_rectangles() -> None:
     assert len(found) < 1.15 * shows.sum()
 
 
-@pytest.mark.parametrize("street", [Street, CpuStreet])
+@pytest.mark.parametrize("street", [ShaderStreet, ProcessorStreet])
 def test_nothing_in_view_and_no_views_draw_nothing(street: Any) -> None:
     placed = facing(0.0, 0)
     textures = random_textures(STILL, seed=11, opaque=True)
@@ -292,6 +294,6 @@ def test_other_cameras_are_refused() -> None:
         stage_camera(stretched, pose, SIZE[1])
     with pytest.raises(ValueError, match=r"in row 61.5; expected 59.5, the middle of 120"):
         stage_camera(moved, pose, SIZE[1])
-    street = Street(facing(0.0, 0), random_textures(STILL))
+    street = ShaderStreet(facing(0.0, 0), random_textures(STILL))
     with pytest.raises(ValueError, match=r"in column 81.5; expected 79.5, the middle of 160"):
         street.look(aside, pose, *SIZE)
