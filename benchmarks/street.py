@@ -20,11 +20,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from assets_defs.street_billboards.capture_datasets import viewers
 from assets_defs.street_billboards.datasets import (
     billboards_of,
     compressed_of,
     pages_of,
-    viewers,
     views_of,
 )
 from assets_defs.street_billboards.graph import STREET
@@ -37,7 +37,9 @@ from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
 from pipelines.street_billboards.capture.depth_refinement import filled
 from pipelines.street_billboards.capture.stereo import disparity_defaults, match
-from pipelines.street_billboards.drawing.stage_view import CpuStreet, Street, stage_camera
+from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
+from pipelines.street_billboards.drawing.shader_street import ShaderStreet
+from pipelines.street_billboards.drawing.stage_camera import stage_camera
 from pipelines.street_billboards.textures import eigen_textures as coding
 from pipelines.street_billboards.textures.forms import SEEN, ViewTextures
 from storage.readers.street_photographs import motorcycle
@@ -106,8 +108,7 @@ def _bytes(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
     rmse, psnr = coding.decode_error(views, textures)
     sky = stored("depth_maps")["sky"]
     behind = sky.size // 3 // 2 * SKY_BYTES_A_TEXEL  # its upper half, a byte a channel
-    places = viewers(stored("drive_frames"))
-    metres = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    metres = figures.path_length(viewers(stored("drive_frames")))
     everything = parts["total"] + HEADER_BYTES * count + behind
     return {
         "billboards": count,
@@ -292,8 +293,8 @@ def _speed(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
     seconds: dict[str, float] = {}
     visible: list[int] = []
     for name, street in (
-        ("shader", Street(made, pages_of(stored("texture_atlases")))),
-        ("cpu", CpuStreet(made, textures)),
+        ("shader", ShaderStreet(made, pages_of(stored("texture_atlases")))),
+        ("cpu", ProcessorStreet(made, textures)),
     ):
         with Stage(*size) as stage:
             stage.add(*street.actors)

@@ -10,17 +10,19 @@ from pydantic import Field
 from assets_defs.checks import Check
 from assets_defs.settings import Settings
 from assets_defs.sources import Source
+from assets_defs.street_billboards.capture_datasets import viewers
 from assets_defs.street_billboards.datasets import (
+    atlases_dataset,
+    compressed_dataset,
     compressed_of,
-    compressed_variables,
-    page_variables,
     pages_of,
-    viewers,
     views_of,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata
-from pipelines.street_billboards.figures import RAW_BYTES
+from assets_defs.street_billboards.drive import metres_of
+from assets_defs.system import Pictures, Result
+from pipelines.street_billboards import figures
+from pipelines.street_billboards.billboards import HEADER_BYTES
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
@@ -29,13 +31,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
+    from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
 
 _LEAST_BYTES = 136
 """A billboard has a mask, a mean colour and a direction at least."""
 _LEAST_WIDTH = 5.0
 """Metres of a road."""
+_NOISE = 8.0
+"""Codes; of the paper's form, what its error is measured by."""
 
 
 @STREET.before_work
@@ -46,8 +49,6 @@ def check_bytes(sources: Mapping[str, Source], settings: Mapping[str, Settings])
     """
     if "drive" not in sources or "texture_atlases" not in settings:
         return
-    from assets_defs.street_billboards.drive import metres_of
-
     source = sources["drive"]
     voxel = settings["billboards"].model_dump()["voxel"]
     eigen, budget = settings["eigen_textures"].model_dump(), settings["texture_atlases"]
@@ -90,39 +91,35 @@ def _eigen_pictures(dataset: xr.Dataset) -> Pictures:
     return {"eigen-images": eigen_sheet(compressed_of(dataset))}
 
 
-def _over_budget(checked: StoredVersion) -> float:
+def _over_budget(version: StoredVersion) -> float:
     """Error over the error asked for; of the paper's form, over a grey level of 8 bit noise."""
-    settings = checked.record["settings"]
-    asked = settings["error"] if settings["coding"] == "compact" else 8.0
-    return _decoded_rmse(checked) / float(asked)
+    settings = version.record["settings"]
+    asked = settings["error"] if settings["coding"] == "compact" else _NOISE
+    return _decoded_rmse(version) / float(asked)
 
 
-def _decoded_rmse(checked: StoredVersion) -> float:
+def _sampled_rmse(version: StoredVersion) -> float:
+    return _decoded_rmse(version) / max(float(version.dataset["rmse"]), 1e-9)
+
+
+def _decoded_rmse(version: StoredVersion) -> float:
     """Of some two hundred billboards, decoded anew."""
     from pipelines.street_billboards.textures.figures import decoded_rmse
 
-    return decoded_rmse(views_of(checked.input("view_textures")), compressed_of(checked.dataset))
+    return decoded_rmse(views_of(version.input("view_textures")), compressed_of(version.dataset))
 
 
-def _sampled_rmse(checked: StoredVersion) -> float:
-    return _decoded_rmse(checked) / max(float(checked.dataset["rmse"]), 1e-9)
+def _byte_share(version: StoredVersion) -> float:
+    dataset = version.dataset
+    return float(dataset["bytes"]) / (figures.RAW_BYTES * max(dataset.sizes["billboard"], 1))
 
 
-def _byte_share(checked: StoredVersion) -> float:
-    dataset = checked.dataset
-    return float(dataset["bytes"]) / (RAW_BYTES * max(dataset.sizes["billboard"], 1))
-
-
-def _excess_rank(checked: StoredVersion) -> float:
-    """By how much a billboard has more eigen-images than observed views, at most."""
-    import numpy as np
-
-    dataset = checked.dataset
-    observed = np.diff(checked.input("view_textures")["first"].values)
-    excess = dataset["ranks"].values.astype(int).max(axis=1) - observed
-    if checked.record["settings"]["coding"] == "paper":
+def _excess_rank(version: StoredVersion) -> float:
+    """The paper's form has as many for every billboard, whatever was observed."""
+    if version.record["settings"]["coding"] == "paper":
         return 0.0
-    return float(max(excess.max(), 0))
+    first = version.input("view_textures")["first"].values
+    return float(figures.excess_rank(version.dataset["ranks"].values, first))
 
 
 @STREET.asset(
@@ -164,37 +161,30 @@ def eigen_textures(
     settings: EigenSettings, billboards: xr.Dataset, view_textures: xr.Dataset
 ) -> Result:
     """Compress the textures."""
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.street_billboards.textures import eigen_textures as coding
+    from pipelines.street_billboards.textures.eigen_textures import byte_counts, decode_error
 
     views, turns = views_of(view_textures), billboards["turns"].values
-    if settings.coding == "paper":
-        made = coding.compressed_paper(
-            views,
-            turns,
-            rank=settings.rank if settings.contribution is None else None,
-            contribution=settings.contribution,
-        )
-    else:
-        made = coding.compressed(views, turns, error=settings.error)
-    counts = coding.byte_counts(made)
-    rmse, psnr = coding.decode_error(views, made)
-    dataset = xr.Dataset(
-        {
-            **compressed_variables(made),
-            "bytes": ((), np.int64(counts["total"])),
-            "rmse": ((), rmse),
-        },
-        attrs={"colour": made.colour},
-    )
-    count = max(len(turns), 1)
-    return dataset, {
-        "bytes": [{"part": part, "bytes a billboard": n / count} for part, n in counts.items()],
-        "bytes a billboard": counts["total"] / count,
+    made = _compressed(settings, views, turns)
+    counts = byte_counts(made)
+    rmse, psnr = decode_error(views, made)
+    each = {part: size / max(len(turns), 1) for part, size in counts.items()}
+    return compressed_dataset(made, counts["total"], rmse), {
+        "bytes": [{"part": part, "bytes a billboard": size} for part, size in each.items()],
+        "bytes a billboard": each["total"],
         "PSNR of textures, dB": psnr,
     }
+
+
+def _compressed(
+    settings: EigenSettings, views: ViewTextures, turns: NDArray[np.bool_]
+) -> CompressedTextures:
+    """In the form that the settings ask for."""
+    from pipelines.street_billboards.textures import eigen_textures as coding
+
+    if settings.coding == "compact":
+        return coding.compressed(views, turns, error=settings.error)
+    rank = settings.rank if settings.contribution is None else None
+    return coding.compressed_paper(views, turns, rank=rank, contribution=settings.contribution)
 
 
 # ---- texture_atlases -------------------------------------------------------------------------
@@ -215,33 +205,23 @@ def _atlas_pictures(dataset: xr.Dataset) -> Pictures:
     return {"detail": atlas_picture(pages_of(dataset)[0])}
 
 
-def _unpacked_error(checked: StoredVersion) -> float:
+def _unpacked_error(version: StoredVersion) -> float:
     """Largest difference of sampled billboards read from the pages and decoded, in codes."""
     from pipelines.street_billboards.textures.figures import unpacked_error
 
-    stored = checked.input("eigen_textures")
-    return unpacked_error(pages_of(checked.dataset), compressed_of(stored))
+    stored = version.input("eigen_textures")
+    return unpacked_error(pages_of(version.dataset), compressed_of(stored))
 
 
-def _bytes_a_metre(checked: StoredVersion) -> float:
-    import numpy as np
-
-    from pipelines.street_billboards.billboards import HEADER_BYTES
-
-    dataset = checked.dataset
-    way = _metres(viewers(checked.input("drive_frames")))
+def _bytes_a_metre(version: StoredVersion) -> float:
+    dataset = version.dataset
     header = HEADER_BYTES * dataset.sizes["billboard"]
-    return (float(np.asarray(dataset["bytes"])) + header) / way
+    way = figures.path_length(viewers(version.input("drive_frames")))
+    return (float(dataset["bytes"]) + header) / way
 
 
-def _metres(places: NDArray[np.float64]) -> float:
-    import numpy as np
-
-    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-
-
-def _padding_share(checked: StoredVersion) -> float:
-    dataset = checked.dataset
+def _padding_share(version: StoredVersion) -> float:
+    dataset = version.dataset
     return float(dataset["padding"]) / float(dataset["padding"] + dataset["bytes"])
 
 
@@ -280,26 +260,13 @@ def texture_atlases(
     eigen_textures: xr.Dataset,
 ) -> Result:
     """Pack the textures into pages."""
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.street_billboards.billboards import HEADER_BYTES
     from pipelines.street_billboards.textures.atlases import pages
 
     textures = compressed_of(eigen_textures)
     made = pages(textures, settings.most_texels, byte_budget=settings.byte_budget)
-    used = sum(page.bytes for page in made)
-    dataset = xr.Dataset(
-        {
-            **page_variables(made, len(textures.first) - 1),
-            "bytes": ((), np.int64(used)),
-            "padding": ((), np.int64(sum(page.padding for page in made))),
-        },
-        attrs={"colour": textures.colour},
-    )
-    count = billboards.sizes["billboard"]
-    way = _metres(viewers(drive_frames))
-    return dataset, {
+    used, count = sum(page.bytes for page in made), billboards.sizes["billboard"]
+    way = figures.path_length(viewers(drive_frames))
+    return atlases_dataset(made, textures), {
         "pages": len(made),
         "bytes a billboard": used / max(count, 1) + HEADER_BYTES,
         "bytes a metre of road": (used + HEADER_BYTES * count) / way,

@@ -1,82 +1,118 @@
-"""From the store's datasets to what the numerics take."""
+"""Stored billboards, textures and pictures and the objects of `pipelines`, in both directions.
+
+Those of drives, depths and points are in `capture_datasets`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from pipelines.street_billboards.billboards import Billboards
+from pipelines.street_billboards.road_tiles import TiledBillboards
+from pipelines.street_billboards.textures.atlases import Atlas, Page
+from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
+from storage.stored_version import StoredVersion
+
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.geometry.cameras import Cameras
-    from pipelines.street_billboards.billboards import Billboards
-    from pipelines.street_billboards.capture.point_fusion import FrameViews
-    from pipelines.street_billboards.textures.atlases import Page
-    from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
+    from pipelines.street_billboards.frames import StreetFrames, StreetModel, Viewpoints
 
 
-def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> FrameViews:
-    """The photographs of some frames that are not held out, one row a photograph."""
-    import numpy as np
+# ---- billboards ------------------------------------------------------------------------------
 
-    from pipelines.street_billboards.capture.point_fusion import FrameViews
 
-    frames = depths["frame"].values[taken]
-    cameras = drive.sizes["camera"]
-    pictures = drive["photographs"].isel(frame=frames).values
-    return FrameViews(
-        _merged(depths["depth"][taken].values),
-        _merged(depths["deviation"][taken].values),
-        _merged(pictures),
-        np.tile(drive["intrinsics"].values, (len(frames), 1, 1)).reshape(-1, 3, 3),
-        drive["poses"].values[frames].reshape(len(frames) * cameras, 4, 4),
+def billboards_dataset(road: TiledBillboards) -> xr.Dataset:
+    """`billboards` of a road's."""
+    import xarray as xr
+
+    dims = {1: ("billboard",), 2: ("billboard", "axis")}
+    return xr.Dataset(
+        {
+            **{name: (dims[a.ndim], a) for name, a in road.billboards._asdict().items()},
+            "tile": (("billboard",), road.tile),
+            "side": ((), road.side),
+            "depth": ((), np.int64(road.depth)),
+        }
     )
-
-
-def _merged(stacked: NDArray[Any]) -> NDArray[Any]:
-    """Frames and cameras as one axis."""
-    return stacked.reshape(-1, *stacked.shape[2:])
-
-
-def taken_cameras(drive: xr.Dataset) -> Cameras:
-    """All cameras where they took what is not held out."""
-    import numpy as np
-
-    from pipelines.geometry.cameras import Cameras
-
-    poses = drive["poses"].values[~drive["held_out"].values]
-    lenses = np.broadcast_to(drive["intrinsics"].values, (*poses.shape[:2], 3, 3))
-    return Cameras(
-        lenses.reshape(-1, 3, 3), poses.reshape(-1, 4, 4), drive.sizes["x"], drive.sizes["y"]
-    )
-
-
-def viewers(drive: xr.Dataset) -> NDArray[np.float64]:
-    """Places (frame, 3) of the middle camera where it took what is not held out."""
-    middle = drive.sizes["camera"] // 2
-    places: NDArray[np.float64] = drive["poses"].values[:, middle, :3, 3]
-    return places[~drive["held_out"].values]
 
 
 def billboards_of(dataset: xr.Dataset) -> Billboards:
     """The billboards of a `billboards` dataset, or of some of its rows."""
-    from pipelines.street_billboards.billboards import Billboards
-
     return Billboards(*(dataset[name].values for name in Billboards._fields))
+
+
+def road_of(dataset: xr.Dataset) -> TiledBillboards:
+    """A `billboards` dataset's billboards with the tiles that they lie in."""
+    return TiledBillboards(
+        billboards_of(dataset),
+        dataset["tile"].values,
+        float(dataset["side"]),
+        int(dataset["depth"]),
+    )
+
+
+# ---- textures --------------------------------------------------------------------------------
+
+
+def views_dataset(views: ViewTextures) -> xr.Dataset:
+    """`view_textures` of sampled textures."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "first": (("billboard_end",), views.first),
+            "direction": (("view",), views.direction),
+            "colours": (("view", "v", "u", "channel"), views.colours),
+            "states": (("view", "v", "u"), views.states),
+            "sharpness": (("view",), views.sharpness),
+        }
+    )
 
 
 def views_of(dataset: xr.Dataset) -> ViewTextures:
     """A `view_textures` dataset's textures."""
-    from pipelines.street_billboards.textures.forms import ViewTextures
-
     return ViewTextures(*(dataset[name].values for name in ViewTextures._fields))
+
+
+def views_of_rows(dataset: xr.Dataset, billboards: slice) -> ViewTextures:
+    """The textures of some consecutive billboards; no others are loaded."""
+    ends = dataset["first"].values[billboards.start : billboards.stop + 1]
+    some = dataset.isel(view=slice(int(ends[0]), int(ends[-1])))
+    return ViewTextures(ends - ends[0], *(some[name].values for name in ViewTextures._fields[1:]))
+
+
+def compressed_dataset(textures: CompressedTextures, size: int, rmse: float) -> xr.Dataset:
+    """`eigen_textures` of compressed textures, of so many bytes and with this error in codes."""
+    import xarray as xr
+
+    variables: dict[str, tuple[tuple[str, ...], Any]] = {
+        "first": (("billboard_end",), textures.first),
+        "direction": (("view",), textures.direction),
+        "means": (("view", "channel"), textures.means),
+        "ranks": (("billboard", "channel"), textures.ranks),
+        "first_mask": (("billboard_end",), textures.first_mask),
+        "masks": (("mask", "v", "byte"), textures.masks),
+    }
+    for number in range(3):
+        plane = f"plane_{number}"
+        variables |= {
+            f"planes_{number}": ((plane, f"v_{number}", f"u_{number}"), textures.planes[number]),
+            f"scales_{number}": ((plane,), textures.scales[number]),
+            f"weights_{number}": ((f"weight_{number}",), textures.weights[number]),
+        }
+    return xr.Dataset(
+        {**variables, "bytes": ((), np.int64(size)), "rmse": ((), rmse)},
+        attrs={"colour": textures.colour},
+    )
 
 
 def compressed_of(dataset: xr.Dataset) -> CompressedTextures:
     """An `eigen_textures` dataset's textures."""
-    from pipelines.street_billboards.textures.forms import CompressedTextures
 
     def channels(name: str) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         first, second, third = (dataset[f"{name}_{number}"].values for number in range(3))
@@ -96,65 +132,42 @@ def compressed_of(dataset: xr.Dataset) -> CompressedTextures:
     )
 
 
-def compressed_variables(textures: CompressedTextures) -> dict[str, tuple[tuple[str, ...], Any]]:
-    """The variables of an `eigen_textures` dataset, without its colour."""
-    variables: dict[str, tuple[tuple[str, ...], Any]] = {
-        "first": (("billboard_end",), textures.first),
-        "direction": (("view",), textures.direction),
-        "means": (("view", "channel"), textures.means),
-        "ranks": (("billboard", "channel"), textures.ranks),
-        "first_mask": (("billboard_end",), textures.first_mask),
-        "masks": (("mask", "v", "byte"), textures.masks),
-    }
-    for number in range(3):
-        plane = f"plane_{number}"
-        variables |= {
-            f"planes_{number}": ((plane, f"v_{number}", f"u_{number}"), textures.planes[number]),
-            f"scales_{number}": ((plane,), textures.scales[number]),
-            f"weights_{number}": ((f"weight_{number}",), textures.weights[number]),
-        }
-    return variables
-
-
-def page_variables(
-    pages: Sequence[Page], billboards: int
-) -> dict[str, tuple[tuple[str, ...], NDArray[Any]]]:
-    """The variables of a `texture_atlases` dataset: pages end to end, and their shapes."""
-    import numpy as np
+def atlases_dataset(pages: Sequence[Page], textures: CompressedTextures) -> xr.Dataset:
+    """`texture_atlases` of pages: one after the other, and their shapes."""
+    import xarray as xr
 
     def flat(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate([array.ravel() for array in arrays])
 
-    page_of = np.zeros(billboards, np.int64)
+    page_of = np.zeros(len(textures.first) - 1, np.int64)
     for number, page in enumerate(pages):
         page_of[page.billboards] = number
     shapes = [
         [array.shape[:2] for array in (*page.detail[:2], *page.tint[:2], page.views, page.masks)]
         for page in pages
     ]
-    return {
-        "detail": (("detail_byte",), flat(page.detail.texels for page in pages)),
-        "detail_scales": (("detail_scale",), flat(page.detail.scales for page in pages)),
-        "tint": (("tint_byte",), flat(page.tint.texels for page in pages)),
-        "tint_scales": (("tint_scale",), flat(page.tint.scales for page in pages)),
-        "views": (("view_byte",), flat(page.views for page in pages)),
-        "masks": (("mask_byte",), flat(page.masks for page in pages)),
-        "records": (("record",), flat(page.records for page in pages)),
-        "shapes": (("page", "texture", "axis_2"), np.array(shapes, np.int64)),
-        "reach": (
-            ("page", "atlas"),
-            np.array([[page.detail.most_tiles, page.tint.most_tiles] for page in pages], np.int64),
-        ),
-        "page": (("billboard",), page_of),
-    }
+    reach = [[page.detail.most_tiles, page.tint.most_tiles] for page in pages]
+    return xr.Dataset(
+        {
+            "detail": (("detail_byte",), flat(page.detail.texels for page in pages)),
+            "detail_scales": (("detail_scale",), flat(page.detail.scales for page in pages)),
+            "tint": (("tint_byte",), flat(page.tint.texels for page in pages)),
+            "tint_scales": (("tint_scale",), flat(page.tint.scales for page in pages)),
+            "views": (("view_byte",), flat(page.views for page in pages)),
+            "masks": (("mask_byte",), flat(page.masks for page in pages)),
+            "records": (("record",), flat(page.records for page in pages)),
+            "shapes": (("page", "texture", "axis_2"), np.array(shapes, np.int64)),
+            "reach": (("page", "atlas"), np.array(reach, np.int64)),
+            "page": (("billboard",), page_of),
+            "bytes": ((), np.int64(sum(page.bytes for page in pages))),
+            "padding": ((), np.int64(sum(page.padding for page in pages))),
+        },
+        attrs={"colour": textures.colour},
+    )
 
 
 def pages_of(dataset: xr.Dataset) -> list[Page]:
     """A `texture_atlases` dataset's pages."""
-    import numpy as np
-
-    from pipelines.street_billboards.textures.atlases import Atlas, Page
-
     names = ("detail", "detail_scales", "tint", "tint_scales", "views", "masks")
     flat = {name: dataset[name].values for name in (*names, "records")}
     taken = dict.fromkeys(flat, 0)
@@ -186,3 +199,90 @@ def pages_of(dataset: xr.Dataset) -> list[Page]:
             )
         )
     return pages
+
+
+# ---- pictures --------------------------------------------------------------------------------
+
+
+def model_of(
+    billboards: xr.Dataset,
+    texture_atlases: xr.Dataset,
+    eigen_textures: xr.Dataset,
+    depth_maps: xr.Dataset,
+) -> StreetModel:
+    """All that a street is drawn from."""
+    from pipelines.street_billboards.frames import StreetModel
+
+    return StreetModel(
+        billboards_of(billboards),
+        pages_of(texture_atlases),
+        compressed_of(eigen_textures),
+        depth_maps["sky"].values,
+    )
+
+
+def viewpoints_of(
+    drive: xr.Dataset, offsets: Sequence[float], flight_frames: int, swerve: float
+) -> Viewpoints:
+    """Where a drive's middle camera looks from."""
+    from pipelines.street_billboards.frames import viewpoints
+
+    middle = drive.sizes["camera"] // 2
+    return viewpoints(
+        drive["intrinsics"].values[middle],
+        drive["poses"].values[:, middle],
+        drive["held_out"].values,
+        (drive.sizes["x"], drive.sizes["y"]),
+        offsets=offsets,
+        flight_frames=flight_frames,
+        swerve=swerve,
+    )
+
+
+def true_pictures(drive: xr.Dataset) -> NDArray[np.uint8]:
+    """Photographs (held, y, x, 3) of the middle camera that were held out."""
+    held_out, middle = drive["held_out"].values, drive.sizes["camera"] // 2
+    pictures: NDArray[np.uint8] = drive["photographs"].isel(frame=held_out, camera=middle).values
+    return pictures
+
+
+def frames_dataset(
+    frames: StreetFrames,
+    truth: NDArray[np.uint8],
+    offsets: Sequence[float],
+    beside_truth: NDArray[np.uint8] | None,
+) -> xr.Dataset:
+    """`street_frames` of the pictures drawn and the true ones; beside the path if known."""
+    import xarray as xr
+
+    pixels = ("y", "x", "channel")
+    dataset = xr.Dataset(
+        {
+            "flight": (("frame", *pixels), frames.flight),
+            "rendered": (("held", *pixels), frames.rendered),
+            "truth": (("held", *pixels), truth),
+            "alone": (("held", *pixels), frames.alone),
+            "covered": (("held", "y", "x"), frames.covered),
+            "beside": (("held", "offset", *pixels), frames.beside),
+            "beside_covered": (("held", "offset", "y", "x"), frames.beside_covered),
+            "offset": (("offset",), np.array(offsets)),
+            "shaded": (pixels, frames.shaded),
+            "decoded": (pixels, frames.decoded),
+            **{
+                name: (("held",), np.array([getattr(one, name) for one in frames.metrics]))
+                for name in ("psnr", "ssim", "flip")
+            },
+        }
+    )
+    if beside_truth is not None:
+        dataset["beside_truth"] = (("held", "offset", *pixels), beside_truth)
+    return dataset
+
+
+LOADERS: dict[str, Callable[[StoredVersion], object]] = {
+    "billboards": lambda version: billboards_of(version.dataset),
+    "view_textures": lambda version: views_of(version.dataset),
+    "eigen_textures": lambda version: compressed_of(version.dataset),
+    "texture_atlases": lambda version: pages_of(version.dataset),
+}
+"""What ``tsuya.load`` gives, by asset: the billboards, their textures, the pages they are on."""

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from assets_defs.sources import Source
-from assets_defs.street_billboards.drive_agreement import check_agreement
 from assets_defs.system import Dimension, System
-from storage.readers.drives import read_drive
+from storage.readers.drives import Drive, read_drive, read_frame
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
@@ -21,7 +20,29 @@ CITY = "city"
 def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
     """Everything but the pixels; then a few frames, whether they show one world."""
     if source.path is not None:
-        check_agreement(read_drive(source.path), source.name)
+        _check_agreement(read_drive(source.path), source.name)
+
+
+def _check_agreement(drive: Drive, name: str) -> None:
+    """Whether three frames in the middle of a drive show one world. Raises ValueError."""
+    from pipelines.street_billboards.capture.drive_agreement import (
+        LEAST_AGREEMENT,
+        neighbours_agreement,
+    )
+    from pipelines.street_billboards.capture.drive_depth import RigFrame
+
+    middle = min(max(len(drive.times) // 2, 1), len(drive.times) - 2)
+    found = neighbours_agreement(
+        [
+            RigFrame(read_frame(drive, frame), drive.intrinsics, drive.poses[frame])
+            for frame in (middle - 1, middle, middle + 1)
+        ]
+    )
+    if found < LEAST_AGREEMENT:
+        raise ValueError(
+            f"{name}: of the points of time {drive.times[middle]:g} the frames beside it confirm "
+            f"{found:.0%}; expected {LEAST_AGREEMENT:.0%} at least: intrinsics or poses are wrong."
+        )
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Settings
-from assets_defs.street_billboards.datasets import frame_views
+from assets_defs.street_billboards.capture_datasets import (
+    depth_dataset,
+    loaded_by_frame,
+    points_dataset,
+    rig_frame_of,
+    stacked_by_frame,
+)
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.street_billboards import figures
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.capture.point_fusion import Points
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
-
-_SKY_FRAMES = 6
-"""Frames that the sky is put together from."""
-_ASKED_FRAMES = 8
-"""Frames of which it is measured how much their neighbours confirm."""
 
 # ---- depth_maps ------------------------------------------------------------------------------
 
@@ -53,42 +49,31 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _stereo_bad(checked: StoredVersion) -> float:
+def _stereo_bad(version: StoredVersion) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
     from pipelines.street_billboards.capture.depth_refinement import filled
     from pipelines.street_billboards.capture.stereo import match
-    from pipelines.street_billboards.figures import bad_pixel_share
     from storage.readers.street_photographs import motorcycle
 
     pair = motorcycle()
     found, _ = match(pair.left, pair.right, pair.most)
-    return bad_pixel_share(filled(found.disparity, pair.left), pair.disparity)
+    return figures.bad_pixel_share(filled(found.disparity, pair.left), pair.disparity)
 
 
-def _depth_error(checked: StoredVersion) -> float | None:
+def _depth_error(version: StoredVersion) -> float | None:
     """Against the true depth of held-out frames, which are matched for this alone."""
     from pipelines.street_billboards.capture.stereo import depth_maps
-    from pipelines.street_billboards.figures import depth_error
 
-    drive = checked.input("drive_frames")
+    drive, settings = version.input("drive_frames"), version.record["settings"]
     if "truth_depth" not in drive:
         return None
-    settings = checked.record["settings"]
-    frame = int(drive["held_out"].values.argmax())
-    maps = depth_maps(
-        drive["photographs"][frame].values,
-        drive["intrinsics"].values,
-        drive["poses"][frame].values,
-        nearest=settings["nearest"],
-        farthest=settings["farthest"],
-    )
-    return depth_error(maps.depth[len(maps.depth) // 2], drive["truth_depth"][0].values)
+    frame = rig_frame_of(drive, int(drive["held_out"].values.argmax()))
+    maps = depth_maps(*frame, nearest=settings["nearest"], farthest=settings["farthest"])
+    return figures.depth_error(maps.depth[len(maps.depth) // 2], drive["truth_depth"][0].values)
 
 
-def _known_share(checked: StoredVersion) -> float:
-    import numpy as np
-
-    return float(np.isfinite(checked.dataset["depth"]).mean().compute())
+def _known_share(version: StoredVersion) -> float:
+    return float(np.isfinite(version.dataset["depth"]).mean().compute())
 
 
 @STREET.asset(
@@ -123,62 +108,27 @@ def _known_share(checked: StoredVersion) -> float:
         ),
     ),
 )
-def depth_maps(
-    settings: DepthSettings, progress: Callable[[float], None], drive_frames: xr.Dataset
-) -> Result:
+def depth_maps(settings: DepthSettings, progress: Progress, drive_frames: xr.Dataset) -> Result:
     """Match each frame's neighbouring cameras, frame by frame, as the store takes them."""
-    import dask
-    import dask.array as da
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.street_billboards.capture import stereo
-    from pipelines.street_billboards.capture.sky import SkyView, sky_map, sky_pixels
+    from pipelines.street_billboards.capture.drive_depth import (
+        RigFrame,
+        depth_before_sky,
+        drive_sky,
+    )
 
     taken = np.flatnonzero(~drive_frames["held_out"].values)
-    intrinsics, poses = drive_frames["intrinsics"].values, drive_frames["poses"].values
-    shape = drive_frames["photographs"].shape[1:4]
-    done, lock = [0], threading.Lock()
+    reach = {"nearest": settings.nearest, "farthest": settings.farthest}
 
-    def matched(frame: int) -> tuple[list[SkyView], NDArray[np.float32]]:
-        pictures = drive_frames["photographs"][frame].values
-        maps = stereo.depth_maps(
-            pictures,
-            intrinsics,
-            poses[frame],
-            nearest=settings.nearest,
-            farthest=settings.farthest,
-        )
-        views = map(SkyView, pictures, maps.depth, intrinsics, poses[frame])
-        return list(views), maps.deviation
-
-    some = taken[:: max(len(taken) // _SKY_FRAMES, 1)]
-    sky = sky_map([view for frame in some for view in matched(frame)[0]])
+    def load(frame: int) -> RigFrame:
+        return rig_frame_of(drive_frames, frame)
 
     def maps_of(frame: int) -> NDArray[np.float32]:
-        views, deviation = matched(frame)
-        depth = [np.where(sky_pixels(view), np.inf, view.depth) for view in views]
-        with lock:
-            done[0] += 1
-            progress(done[0] / len(taken))
-        return np.stack([np.array(depth, np.float32), deviation])
+        return np.stack(depth_before_sky(load(frame), **reach))
 
-    maps = da.stack(
-        [
-            da.from_delayed(dask.delayed(maps_of, pure=False)(frame), (2, *shape), np.float32)
-            for frame in taken
-        ]
-    )
-    dims = ("taken", "camera", "y", "x")
-    dataset = xr.Dataset(
-        {
-            "depth": (dims, maps[:, 0]),
-            "deviation": (dims, maps[:, 1]),
-            "frame": (("taken",), taken.astype(np.int64)),
-            "sky": (("row", "column", "channel"), sky),
-        }
-    )
-    return dataset, {"photographs": len(taken) * shape[0]}
+    sky = drive_sky(load, taken, **reach)
+    shape = drive_frames["photographs"].shape[1:4]
+    maps = stacked_by_frame(maps_of, taken, ((2, *shape), np.float32), progress)
+    return depth_dataset(maps, taken, sky), {"photographs": len(taken) * shape[0]}
 
 
 # ---- street_points ---------------------------------------------------------------------------
@@ -199,40 +149,31 @@ def _point_pictures(dataset: xr.Dataset) -> Pictures:
     return {"points": points_picture(dataset["positions"].values, dataset["colours"].values)}
 
 
-def _agreement(checked: StoredVersion) -> float:
-    return float(checked.dataset["agreement"].mean(skipna=True))
+def _agreement(version: StoredVersion) -> float:
+    return float(version.dataset["agreement"].mean(skipna=True))
 
 
-def _points_a_metre(checked: StoredVersion) -> float:
-    import numpy as np
-
-    places = checked.input("drive_frames")["poses"].values[:, 0, :3, 3]
-    way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-    return checked.dataset.sizes["point"] / way
+def _points_a_metre(version: StoredVersion) -> float:
+    places = version.input("drive_frames")["poses"].values[:, 0, :3, 3]
+    return version.dataset.sizes["point"] / figures.path_length(places)
 
 
-def _stray_share(checked: StoredVersion) -> float | None:
+def _stray_share(version: StoredVersion) -> float | None:
     """Against the true depth of held-out frames: a point before it hangs in the air."""
-    from pipelines.street_billboards.figures import stray_share
-
-    drive = checked.input("drive_frames")
+    drive = version.input("drive_frames")
     if "truth_depth" not in drive:
         return None
     middle = drive.sizes["camera"] // 2
-    return stray_share(
-        checked.dataset["positions"].values,
+    return figures.stray_share(
+        version.dataset["positions"].values,
         drive["intrinsics"].values[middle],
         drive["poses"].values[drive["held_out"].values, middle],
         drive["truth_depth"].values,
     )
 
 
-def _gain_step(checked: StoredVersion) -> float:
-    """Evened out, neighbouring photographs should agree: what is left, as a factor less one."""
-    import numpy as np
-
-    gains = checked.dataset["gains"].values
-    return float(np.abs(np.log(gains)).max())
+def _largest_gain(version: StoredVersion) -> float:
+    return figures.largest_log_gain(version.dataset["gains"].values)
 
 
 @STREET.asset(
@@ -267,73 +208,26 @@ def _gain_step(checked: StoredVersion) -> float:
         Check(
             "largest_gain",
             "Largest logarithm of a photograph's exposure.",
-            _gain_step,
+            _largest_gain,
             at_most=1.5,
             change=0.05,
         ),
     ),
 )
 def street_points(
-    settings: PointSettings,
-    progress: Callable[[float], None],
-    drive_frames: xr.Dataset,
-    depth_maps: xr.Dataset,
+    settings: PointSettings, progress: Progress, drive_frames: xr.Dataset, depth_maps: xr.Dataset
 ) -> Result:
     """Keep what neighbouring frames confirm; even out exposures by what photographs share."""
-    import numpy as np
-    import xarray as xr
+    from pipelines.street_billboards.capture.drive_points import Fusion, drive_gains, drive_points
 
-    from pipelines.street_billboards.capture.exposure import exposure_gains
-    from pipelines.street_billboards.capture.point_fusion import agreement, consistent_points, fused
-    from pipelines.street_billboards.textures.observations import observed
-
-    count, cameras = depth_maps.sizes["taken"], drive_frames.sizes["camera"]
-    confirmed = np.full(count, np.nan)
-    asked = set(np.linspace(0, count - 1, min(_ASKED_FRAMES, count)).astype(int))
-
-    def parts() -> Iterator[Points]:
-        for number in range(count):
-            progress(0.7 * number / count)
-            frame = frame_views(drive_frames, depth_maps, slice(number, number + 1))
-            around = slice(max(number - 3, 0), number + 4)
-            neighbours = frame_views(drive_frames, depth_maps, around)
-            if number in asked:
-                confirmed[number] = agreement(frame, neighbours)
-            yield consistent_points(
-                frame,
-                neighbours,
-                least_support=settings.support,
-                farthest=settings.farthest_point,
-                step=settings.step,
-            )
-
-    points = fused(parts(), settings.cell)
-    if len(points.positions) == 0:
-        raise ValueError(
-            "street_points: no point is confirmed by other frames; expected consistent intrinsics "
-            "and poses."
-        )
-    rows = [
-        observed(
-            points.positions,
-            frame_views(drive_frames, depth_maps, slice(number, number + 1)),
-            farthest=settings.farthest_point,
-        ).shifted(number * cameras)
-        for number in range(count)
-    ]
-    progress(0.9)
-    gains = exposure_gains(
-        np.concatenate([row.point for row in rows]),
-        np.concatenate([row.photograph for row in rows]),
-        np.concatenate([row.radiance for row in rows]),
-        count * cameras,
+    drive = loaded_by_frame(drive_frames, depth_maps)
+    fusion = Fusion(settings.support, settings.farthest_point, settings.step, settings.cell)
+    found = drive_points(drive, fusion, progress=lambda fraction: progress(0.7 * fraction))
+    positions = found.points.positions
+    gains = drive_gains(
+        positions, drive, drive_frames.sizes["camera"], farthest=settings.farthest_point
     )
-    dataset = xr.Dataset(
-        {
-            "positions": (("point", "axis"), points.positions),
-            "colours": (("point", "channel"), points.colours),
-            "gains": (("taken", "camera", "channel"), gains.reshape(count, cameras, 3)),
-            "agreement": (("taken",), confirmed),
-        }
-    )
-    return dataset, {"points": len(points.positions), "agreement": float(np.nanmean(confirmed))}
+    return points_dataset(found, gains), {
+        "points": len(positions),
+        "agreement": float(np.nanmean(found.agreement)),
+    }

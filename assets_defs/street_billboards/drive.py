@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
+from assets_defs.street_billboards.capture_datasets import (
+    drive_dataset,
+    simulated_drive_dataset,
+    stacked_by_frame,
+)
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.street_billboards import figures
 from storage.readers.drives import Drive, read_drive, read_frame
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
-
 OFFSETS = (1.0, 2.0, 3.0)
 """Metres beside the path, to the left."""
-EXPOSURE = 0.95
-"""From the simulated city's radiance to pictures."""
-HELD_OUT_EVERY, HELD_OUT_FIRST = 10, 5
 
 
 class DriveSettings(Settings):
@@ -57,18 +57,15 @@ class DriveSettings(Settings):
 
 def metres_of(source: Source, settings: Settings) -> float:
     """Length of a drive."""
-    import numpy as np
-
     given = settings.model_dump()
     if source.path is None:
         return float(given["frames"] * given["spacing"])
-    places = read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
-    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    return figures.path_length(
+        read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
+    )
 
 
-def _drive_pictures(dataset: xr.Dataset) -> Pictures:
-    import numpy as np
-
+def _pictures(dataset: xr.Dataset) -> Pictures:
     from pipelines.drawing.contact_sheet import contact_sheet
 
     count = dataset.sizes["frame"]
@@ -81,27 +78,20 @@ def _drive_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _spread(checked: StoredVersion) -> float:
-    """How much the photographs' mean codes differ, relative."""
-    means = checked.dataset["photographs"].mean(dim=("y", "x", "channel"), dtype="float64").values
-    return float(means.std() / means.mean())
+def _exposure_spread(version: StoredVersion) -> float:
+    photographs = version.dataset["photographs"]
+    means = photographs.mean(dim=("y", "x", "channel"), dtype="float64")
+    return figures.exposure_spread(means.values)
 
 
-def _detail(checked: StoredVersion) -> float:
-    """Mean difference of neighbouring pixels' codes: what stereo lives on."""
-    import numpy as np
-
-    some = checked.dataset["photographs"].isel(camera=0)
-    greys = some.isel(frame=slice(None, None, 4)).mean(dim="channel", dtype="float32").values
-    return float(np.abs(np.diff(greys, axis=-1)).mean())
+def _detail(version: StoredVersion) -> float:
+    """Of every fourth frame's first photograph."""
+    some = version.dataset["photographs"].isel(camera=0, frame=slice(None, None, 4))
+    return figures.neighbour_difference(some.mean(dim="channel", dtype="float32").values)
 
 
-def _way(checked: StoredVersion) -> float:
-    """Median metres from frame to frame."""
-    import numpy as np
-
-    places = checked.dataset["poses"].values[:, 0, :3, 3]
-    return float(np.median(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+def _frame_spacing(version: StoredVersion) -> float:
+    return figures.frame_spacing(version.dataset["poses"].values[:, 0, :3, 3])
 
 
 @STREET.asset(
@@ -110,12 +100,12 @@ def _way(checked: StoredVersion) -> float:
     settings=DriveSettings,
     from_source=True,
     kinds=frozenset({"zarr", "pyvista"}),
-    pictures=_drive_pictures,
+    pictures=_pictures,
     checks=(
         Check(
             "exposure_spread",
             "Standard deviation of the photographs' mean codes over their mean.",
-            _spread,
+            _exposure_spread,
             at_most=0.5,
             change=0.02,
         ),
@@ -129,16 +119,14 @@ def _way(checked: StoredVersion) -> float:
         Check(
             "frame_spacing",
             "Metres from frame to frame, median.",
-            _way,
+            _frame_spacing,
             at_least=0.01,
             at_most=20.0,
             change=0.01,
         ),
     ),
 )
-def drive_frames(
-    settings: DriveSettings, source: Source, progress: Callable[[float], None]
-) -> Result:
+def drive_frames(settings: DriveSettings, source: Source, progress: Progress) -> Result:
     """Take the drive in, or drive through the simulated city."""
     if source.path is not None:
         return _taken_in(read_drive(source.path), settings, source.name)
@@ -146,112 +134,64 @@ def drive_frames(
 
 
 def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
-    import dask
-    import dask.array as da
-    import numpy as np
-    import xarray as xr
-
+    """A part of a user's drive, its photographs read as the store takes them."""
     from pipelines.street_billboards.capture.centred_pictures import centred, centred_intrinsics
+    from pipelines.street_billboards.capture.held_out import FEWEST_FRAMES, held_out
 
     count = len(drive.times)
     stop = count if settings.stop is None else settings.stop
     chosen = range(count)[settings.start : stop]
-    if stop > count or len(chosen) <= HELD_OUT_FIRST + 1:
+    if stop > count or len(chosen) < FEWEST_FRAMES:
         raise ValueError(
             f"{name}: start is {settings.start} and stop {settings.stop}; expected a part of at "
-            f"least {HELD_OUT_FIRST + 2} of the {count} frames."
+            f"least {FEWEST_FRAMES} of the {count} frames."
         )
-    shape = (len(drive.cameras), drive.height, drive.width, 3)
-    intrinsics = [centred_intrinsics(k, drive.width, drive.height) for k in drive.intrinsics]
 
     def taken(frame: int) -> NDArray[np.uint8]:
         return centred(read_frame(drive, frame), drive.intrinsics)
 
-    photographs = da.stack(
-        [
-            da.from_delayed(dask.delayed(taken, pure=False)(frame), shape, np.uint8)
-            for frame in chosen
-        ]
-    )
+    shape = (len(drive.cameras), drive.height, drive.width, 3)
+    photographs = stacked_by_frame(taken, chosen, (shape, np.uint8))
+    intrinsics = [centred_intrinsics(k, drive.width, drive.height) for k in drive.intrinsics]
     # Graphics are drawn in single precision: far from its zero, a map's grid would have no digits.
     poses = drive.poses[list(chosen)]
     origin = np.round(poses[0, 0, :3, 3])
     poses[..., :3, 3] -= origin
-    dataset = xr.Dataset(
-        {
-            "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
-            "intrinsics": (("camera", "row", "column"), np.stack(intrinsics)),
-            "poses": (("frame", "camera", "row_4", "column_4"), poses),
-            "origin": (("axis",), origin),
-            "held_out": (("frame",), held_out(len(chosen))),
-        }
-    )
+    dataset = drive_dataset(photographs, np.stack(intrinsics), poses, origin, held_out(len(chosen)))
     return dataset, {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
 
 
-def held_out(frames: int) -> NDArray[np.bool_]:
-    """Which of the frames are kept for the test: every tenth."""
-    import numpy as np
-
-    return np.arange(frames) % HELD_OUT_EVERY == HELD_OUT_FIRST
-
-
-def _simulated(settings: DriveSettings, progress: Callable[[float], None]) -> Result:
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.drawing.colour import to_8bit
-    from pipelines.geometry.cameras import moved_left
+def _simulated(settings: DriveSettings, progress: Progress) -> Result:
+    """The built-in drive through the city."""
+    from pipelines.street_billboards.capture.held_out import held_out
+    from pipelines.virtual.city import simulated_drive
     from pipelines.virtual.city.city import city
+    from pipelines.virtual.city.drive_photographs import photograph_drive
     from pipelines.virtual.city.photographing import CityStage
-    from pipelines.virtual.city.simulated_drive import photograph, plan_drive
     from storage.readers.street_photographs import street_photographs
 
-    width, height = settings.width, settings.width * 5 // 8
-    plan = plan_drive(
+    size = settings.width, settings.width * 5 // 8
+    drive = simulated_drive.plan_drive(
         settings.frames,
         settings.spacing,
-        width,
-        height,
+        *size,
         view_angle=settings.view_angle,
         baseline=settings.baseline,
         seed=settings.seed,
         exposure_spread=settings.exposure_spread,
     )
-    kept = held_out(settings.frames)
-    frames, cameras = plan.poses.shape[:2]
-    middle = cameras // 2
-    photographs = np.empty((frames, cameras, height, width, 3), np.uint8)
-    truth_depth, truth_pole, beside = [], [], []
-    random = np.random.default_rng(settings.seed)
-    streets = city(settings.frames * settings.spacing, settings.seed)
+    metres, kept = settings.frames * settings.spacing, held_out(settings.frames)
+    streets = city(metres, settings.seed)
     progress(0.1)
-    with CityStage(streets, street_photographs(), width, height) as stage:
-        for frame in range(frames):
-            for camera in range(cameras):
-                labels = bool(kept[frame]) and camera == middle
-                pose, lens = plan.poses[frame, camera], plan.intrinsics[camera]
-                shot = stage.shoot(lens, pose, labels=labels)
-                photographs[frame, camera] = photograph(
-                    shot.radiance, plan.gains[frame, camera], EXPOSURE, settings.noise, random
-                )
-                if labels:
-                    truth_depth.append(shot.depth)
-                    truth_pole.append(shot.pole)
-                    moved = [stage.shoot(lens, moved_left(pose, offset)) for offset in OFFSETS]
-                    beside.append([to_8bit(EXPOSURE * one.radiance) for one in moved])
-            progress(0.1 + 0.9 * (frame + 1) / frames)
-    dataset = xr.Dataset(
-        {
-            "photographs": (("frame", "camera", "y", "x", "channel"), photographs),
-            "intrinsics": (("camera", "row", "column"), plan.intrinsics),
-            "poses": (("frame", "camera", "row_4", "column_4"), plan.poses),
-            "origin": (("axis",), np.zeros(3)),
-            "held_out": (("frame",), kept),
-            "truth_depth": (("held", "y", "x"), np.array(truth_depth, np.float32)),
-            "truth_pole": (("held", "y", "x"), np.array(truth_pole, bool)),
-            "beside": (("held", "offset", "y", "x", "channel"), np.array(beside, np.uint8)),
-            "offset": (("offset",), np.array(OFFSETS)),
-        }
-    )
-    return dataset, {"triangles": len(streets.triangles), "metres": frames * settings.spacing}
+    with CityStage(streets, street_photographs(), *size) as stage:
+        taken = photograph_drive(
+            stage,
+            drive,
+            kept,
+            offsets=OFFSETS,
+            noise=settings.noise,
+            seed=settings.seed,
+            progress=lambda fraction: progress(0.1 + 0.9 * fraction),
+        )
+    dataset = simulated_drive_dataset(drive, taken, kept, OFFSETS)
+    return dataset, {"triangles": len(streets.triangles), "metres": metres}

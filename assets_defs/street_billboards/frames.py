@@ -5,28 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
-from assets_defs.street_billboards.datasets import billboards_of, compressed_of, pages_of
+from assets_defs.street_billboards.datasets import (
+    frames_dataset,
+    model_of,
+    true_pictures,
+    viewpoints_of,
+)
 from assets_defs.street_billboards.declaration import STREET
 from assets_defs.street_billboards.drive import OFFSETS
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.street_billboards import figures
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
-
-
-_UNSEEN = 2
-"""Frames that the flight leaves out: nobody before them saw the ground that they look at."""
 
 
 class FrameSettings(Settings):
@@ -42,9 +40,7 @@ class FrameSettings(Settings):
     }
 
 
-def _frame_pictures(dataset: xr.Dataset) -> Pictures:
-    import numpy as np
-
+def _pictures(dataset: xr.Dataset) -> Pictures:
     from pipelines.drawing.contact_sheet import contact_sheet
 
     truth, rendered = dataset["truth"].values, dataset["rendered"].values
@@ -64,34 +60,25 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     return pictures
 
 
-def _mean(name: str) -> Callable[[StoredVersion], float]:
-    return lambda checked: float(checked.dataset[name].mean())
+def _coverage(version: StoredVersion) -> float:
+    return float(version.dataset["covered"].mean())
 
 
-def _psnr_anew(checked: StoredVersion) -> float:
-    """From the stored pictures."""
-    import numpy as np
-
-    from pipelines.street_billboards.figures import psnr
-
-    dataset = checked.dataset
-    pictures = zip(
-        dataset["rendered"].values, dataset["truth"].values, dataset["covered"].values, strict=True
+def _held_out_psnr(version: StoredVersion) -> float:
+    """Anew, from the stored pictures."""
+    dataset = version.dataset
+    return figures.mean_psnr(
+        dataset["rendered"].values, dataset["truth"].values, dataset["covered"].values
     )
-    return float(np.mean([psnr(*one) for one in pictures]))
 
 
-def _coverage(checked: StoredVersion) -> float:
-    return float(checked.dataset["covered"].mean())
+def _mean(name: str) -> Callable[[StoredVersion], float]:
+    return lambda version: float(version.dataset[name].mean())
 
 
-def _shader_difference(checked: StoredVersion) -> float:
-    """Share of the pixels in which shader and processor differ by more than a grey level."""
-    import numpy as np
-
-    dataset = checked.dataset
-    apart = np.abs(dataset["shaded"].values.astype(int) - dataset["decoded"].values)
-    return float((apart.max(axis=-1) > 1).mean())
+def _shader_difference(version: StoredVersion) -> float:
+    dataset = version.dataset
+    return figures.differing_share(dataset["shaded"].values, dataset["decoded"].values)
 
 
 @STREET.asset(
@@ -100,7 +87,7 @@ def _shader_difference(checked: StoredVersion) -> float:
     settings=FrameSettings,
     inputs=("drive_frames", "depth_maps", "billboards", "eigen_textures", "texture_atlases"),
     kinds=frozenset({"zarr", "pyvista"}),
-    pictures=_frame_pictures,
+    pictures=_pictures,
     checks=(
         Check(
             "coverage",
@@ -112,7 +99,7 @@ def _shader_difference(checked: StoredVersion) -> float:
         Check(
             "held_out_psnr",
             "PSNR of held-out frames where covered, 8 bit, at their exposure, dB.",
-            _psnr_anew,
+            _held_out_psnr,
             at_least=14.0,
             change=0.3,
         ),
@@ -141,7 +128,7 @@ def _shader_difference(checked: StoredVersion) -> float:
 )
 def street_frames(
     settings: FrameSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     drive_frames: xr.Dataset,
     depth_maps: xr.Dataset,
     billboards: xr.Dataset,
@@ -149,73 +136,20 @@ def street_frames(
     texture_atlases: xr.Dataset,
 ) -> Result:
     """Draw the street from the path, from beside it and from where frames were held out."""
-    import numpy as np
-    import xarray as xr
+    from pipelines.street_billboards.frames import draw_frames
 
-    from pipelines.drawing.colour import to_8bit
-    from pipelines.geometry.cameras import moved_left
-    from pipelines.street_billboards import figures
-    from pipelines.street_billboards.drawing import frames
-
-    made = billboards_of(billboards)
-    sky = depth_maps["sky"].values
-    middle = drive_frames.sizes["camera"] // 2
-    intrinsics = drive_frames["intrinsics"].values[middle]
-    poses = drive_frames["poses"].values[:, middle]
-    kept = drive_frames["held_out"].values
-    truth = drive_frames["photographs"].isel(frame=kept, camera=middle).values
-    size = (drive_frames.sizes["x"], drive_frames.sizes["y"])
-    held = poses[kept]
-    beside = [moved_left(pose, offset) for pose in held for offset in OFFSETS]
-    flight = frames.flight(poses[_UNSEEN:], settings.flight_frames, settings.swerve)
-    with frames.StreetStage(
-        made, pages_of(texture_atlases), sky, size, supersampling=settings.supersampling
-    ) as stage:
-        views = []
-        for number, pose in enumerate([*held, *beside, *flight]):
-            views.append(stage.view(intrinsics, pose))
-            progress(0.8 * number / (len(held) + len(beside) + len(flight)))
-    seen = [view.covered > 0.5 for view in views]
-    shown = [to_8bit(view.with_sky) for view in views]
-    rendered = [
-        figures.match_exposure(picture, true, where)
-        for picture, true, where in zip(shown, truth, seen, strict=False)
-    ]
-    likeness = [figures.image_metrics(*one) for one in zip(rendered, truth, seen, strict=False)]
-    shaded, decoded = frames.compared(
-        made, pages_of(texture_atlases), compressed_of(eigen_textures), intrinsics, held[0], size
+    truth = true_pictures(drive_frames)
+    drawn = draw_frames(
+        model_of(billboards, texture_atlases, eigen_textures, depth_maps),
+        viewpoints_of(drive_frames, OFFSETS, settings.flight_frames, settings.swerve),
+        truth,
+        supersampling=settings.supersampling,
+        progress=lambda fraction: progress(0.8 * fraction),
     )
-    first, last = len(held), len(held) + len(beside)
-    by_offset = (len(held), len(OFFSETS), size[1], size[0])
-    pixels = ("y", "x", "channel")
-    dataset = xr.Dataset(
-        {
-            "flight": (("frame", *pixels), np.stack(shown[last:])),
-            "rendered": (("held", *pixels), np.stack(rendered)),
-            "truth": (("held", *pixels), truth),
-            "alone": (("held", *pixels), np.stack([to_8bit(v.alone) for v in views[:first]])),
-            "covered": (("held", "y", "x"), np.stack(seen[:first])),
-            "beside": (
-                ("held", "offset", *pixels),
-                np.stack(shown[first:last]).reshape(*by_offset, 3),
-            ),
-            "beside_covered": (
-                ("held", "offset", "y", "x"),
-                np.stack(seen[first:last]).reshape(by_offset),
-            ),
-            "offset": (("offset",), np.array(OFFSETS)),
-            "shaded": (pixels, shaded),
-            "decoded": (pixels, decoded),
-            **{
-                name: (("held",), np.array([getattr(one, name) for one in likeness]))
-                for name in ("psnr", "ssim", "flip")
-            },
-        }
-    )
-    if "beside" in drive_frames:
-        dataset["beside_truth"] = (("held", "offset", *pixels), drive_frames["beside"].values)
+    beside = drive_frames["beside"].values if "beside" in drive_frames else None
+    dataset = frames_dataset(drawn, truth, OFFSETS, beside)
     return dataset, {
-        "renderer": stage.renderer_name,
-        "billboards in view": views[0].billboards,
+        "renderer": drawn.renderer,
+        "billboards in view": drawn.visible_billboards,
         "PSNR of held-out frames, dB": float(dataset["psnr"].mean()),
     }

@@ -2,38 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
-from assets_defs.street_billboards.datasets import (
-    billboards_of,
+from assets_defs.street_billboards.capture_datasets import (
+    evening_codes_of,
     frame_views,
+    photographs_of,
     taken_cameras,
     viewers,
+)
+from assets_defs.street_billboards.datasets import (
+    billboards_dataset,
+    billboards_of,
+    road_of,
+    views_dataset,
     views_of,
+    views_of_rows,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.street_billboards import figures
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.geometry.cameras import Cameras
     from pipelines.street_billboards.textures.view_textures import Photographs
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
-
-TILE_FRAMES = 16
-"""Frames of a tile of the road: photographs are loaded tile by tile."""
+_ASKED_POINTS = 7
+"""Every so many points are looked for in billboards."""
 
 
 # ---- billboards ------------------------------------------------------------------------------
@@ -59,38 +64,32 @@ def _billboard_pictures(dataset: xr.Dataset) -> Pictures:
     return {"plan": plan_picture(billboards_of(dataset))}
 
 
-def _points_in(checked: StoredVersion) -> float:
-    """Share of the points that lie in some billboard's voxel, by a tree instead of the octree."""
-    import numpy as np
-    from scipy.spatial import cKDTree
-
-    dataset = checked.dataset
-    positions = checked.input("street_points")["positions"].values[::7]
-    half = float(dataset["side"]) / 2 * (1 + 1e-6)
-    away, _ = cKDTree(dataset["voxel"].values).query(positions, p=np.inf)
-    return float(np.mean(away <= half))
+def _points_in(version: StoredVersion) -> float:
+    dataset = version.dataset
+    return figures.share_in_voxels(
+        _some_points(version), dataset["voxel"].values, float(dataset["side"])
+    )
 
 
-def _off_plane(checked: StoredVersion) -> float:
-    """Metres from points to the still rectangle of their voxel, median."""
-    import numpy as np
-    from scipy.spatial import cKDTree
-
-    dataset = checked.dataset
-    still = ~dataset["turns"].values
-    if not still.any():
-        return 0.0
-    positions = checked.input("street_points")["positions"].values[::7]
-    away, nearest = cKDTree(dataset["voxel"].values).query(positions, p=np.inf)
-    inside = (away <= float(dataset["side"]) / 2) & still[nearest]
-    normal = np.cross(dataset["half_s"].values, dataset["half_t"].values)[nearest[inside]]
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    offset = positions[inside] - dataset["centre"].values[nearest[inside]]
-    return float(np.median(np.abs((offset * normal).sum(axis=1))))
+def _off_plane(version: StoredVersion) -> float:
+    made = billboards_of(version.dataset)
+    return figures.off_plane(
+        _some_points(version),
+        made.voxel,
+        float(version.dataset["side"]),
+        centre=made.centre,
+        normal=np.cross(made.half_s, made.half_t),
+        turns=made.turns,
+    )
 
 
-def _still_share(checked: StoredVersion) -> float:
-    return 1.0 - float(checked.dataset["turns"].mean())
+def _some_points(version: StoredVersion) -> NDArray[np.float64]:
+    positions: NDArray[np.float64] = version.input("street_points")["positions"].values
+    return positions[::_ASKED_POINTS]
+
+
+def _still_share(version: StoredVersion) -> float:
+    return 1.0 - float(version.dataset["turns"].mean())
 
 
 @STREET.asset(
@@ -127,34 +126,18 @@ def billboards(
     settings: BillboardSettings, drive_frames: xr.Dataset, street_points: xr.Dataset
 ) -> Result:
     """Split space into leaves and lay a rectangle through the points of each."""
-    import numpy as np
-    import xarray as xr
-    from scipy.spatial import cKDTree
-
     from pipelines.street_billboards.billboards import laid_through
     from pipelines.street_billboards.octree import octree_leaves
+    from pipelines.street_billboards.road_tiles import TiledBillboards, by_tile
 
     positions = street_points["positions"].values
-    places = viewers(drive_frames)
     leaves = octree_leaves(positions, settings.voxel, settings.least_points)
     made = laid_through(
         leaves, positions, taken_cameras(drive_frames), all_turn=settings.planes == "turning"
     )
-    # In the order of the road, so that the photographs of a tile can be loaded once for all.
-    tile = cKDTree(places).query(made.voxel)[1] // TILE_FRAMES
-    order = np.argsort(tile, kind="stable")
-    variables = {name: values[order] for name, values in made._asdict().items()}
-    dims = {1: ("billboard",), 2: ("billboard", "axis")}
-    dataset = xr.Dataset(
-        {
-            **{name: (dims[values.ndim], values) for name, values in variables.items()},
-            "tile": (("billboard",), tile[order].astype(np.int32)),
-            "side": ((), leaves.side),
-            "depth": ((), np.int64(leaves.depth)),
-        }
-    )
-    return dataset, {
-        "billboards": len(order),
+    road = TiledBillboards(*by_tile(made, viewers(drive_frames)), leaves.side, leaves.depth)
+    return billboards_dataset(road), {
+        "billboards": len(made.turns),
         "standing still": int((~made.turns).sum()),
         "levels of the octree": leaves.depth,
     }
@@ -180,45 +163,32 @@ def _view_pictures(dataset: xr.Dataset) -> Pictures:
     return {"views": views_sheet(views_of(dataset))}
 
 
-def _seen_share(checked: StoredVersion) -> float:
+def _seen_share(version: StoredVersion) -> float:
     """Of all texels of all views."""
-    return float((checked.dataset["states"] == 1).mean().compute())
+    return float((version.dataset["states"] == 1).mean().compute())
 
 
-def _sampling_error(checked: StoredVersion) -> float:
-    """Sampled anew with plain NumPy from all photographs: some must show what is stored."""
-    import numpy as np
-
+def _sampling_error(version: StoredVersion) -> float:
+    """Of one tile only: neither all textures nor all photographs are loaded."""
+    from pipelines.street_billboards.road_tiles import frames_near_tile
     from pipelines.street_billboards.textures.figures import sampling_error
-    from pipelines.street_billboards.textures.forms import ViewTextures
 
-    drive, depths = checked.input("drive_frames"), checked.input("depth_maps")
-    stored, dataset = checked.input("billboards"), checked.dataset
-    tile = int(stored["tile"].values[len(stored["tile"]) // 2])
-    # Of one tile only: neither all textures nor all photographs are loaded.
-    own = np.flatnonzero(stored["tile"].values == tile)
-    ends = dataset["first"].values[own[0] : own[-1] + 2]
-    some = dataset.isel(view=slice(int(ends[0]), int(ends[-1])))
-    views = ViewTextures(ends - ends[0], *(some[name].values for name in ViewTextures._fields[1:]))
-    frames = slice(max((tile - 2) * TILE_FRAMES, 0), (tile + 1) * TILE_FRAMES + 2)
+    stored = version.input("billboards")
+    tiles = stored["tile"].values
+    tile = int(tiles[len(tiles) // 2])
+    own = slice(*np.searchsorted(tiles, [tile, tile + 1]).tolist())
+    frames = frames_near_tile(tile)
     return sampling_error(
         billboards_of(stored.isel(billboard=own)),
-        views,
-        frame_views(drive, depths, frames),
-        _codes(checked.input("street_points"), frames),
+        views_of_rows(version.dataset, own),
+        frame_views(version.input("drive_frames"), version.input("depth_maps"), frames),
+        evening_codes_of(version.input("street_points"), frames),
     )
 
 
-def _views_each(checked: StoredVersion) -> float:
-    dataset = checked.dataset
-    return dataset.sizes["view"] / max(dataset.sizes["billboard_end"] - 1, 1)
-
-
-def _codes(points: xr.Dataset, frames: slice) -> NDArray[np.uint8]:
-    """Codes (photographs, 256, 3) that even out exposures."""
-    from pipelines.street_billboards.capture.exposure import evening_codes
-
-    return evening_codes(points["gains"].values[frames].reshape(-1, 3))
+def _views_each(version: StoredVersion) -> float:
+    sizes = version.dataset.sizes
+    return sizes["view"] / max(sizes["billboard_end"] - 1, 1)
 
 
 @STREET.asset(
@@ -253,111 +223,32 @@ def _codes(points: xr.Dataset, frames: slice) -> NDArray[np.uint8]:
 )
 def view_textures(
     settings: TextureSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     drive_frames: xr.Dataset,
     depth_maps: xr.Dataset,
     street_points: xr.Dataset,
     billboards: xr.Dataset,
 ) -> Result:
     """Sample the billboards' textures, tile of the road by tile."""
-    import numpy as np
-    import xarray as xr
+    from pipelines.street_billboards.textures.tile_textures import view_textures_by_tile
 
-    from pipelines.street_billboards.textures import view_textures as sampling
-    from pipelines.street_billboards.textures.forms import joined
-
-    tiles = billboards["tile"].values
-    places, cameras = viewers(drive_frames), taken_cameras(drive_frames)
-    parts = []
-    for number in np.unique(tiles):
-        progress(0.9 * number / (tiles[-1] + 1))
-        own = np.flatnonzero(tiles == number)
-        some = billboards_of(billboards.isel(billboard=own))
-        near = _frames_that_see(cameras, len(places), some.voxel, settings.farthest_view)
-        frames = slice(int(near[0]), int(near[-1]) + 1) if len(near) else slice(0, 1)
-        photographs = _photographs(
+    def load(frames: slice) -> Photographs:
+        return photographs_of(
             drive_frames, depth_maps, street_points, frames, settings.farthest_view
         )
-        parts.append(
-            sampling.view_textures(
-                some,
-                float(billboards["side"]),
-                photographs,
-                plain=settings.sampling == "plain",
-                farthest=settings.farthest_view,
-            )
-        )
-        del photographs  # before the next tile's are loaded
-    views = joined(parts)
-    dataset = xr.Dataset(
-        {
-            "first": (("billboard_end",), views.first),
-            "direction": (("view",), views.direction),
-            "colours": (("view", "v", "u", "channel"), views.colours),
-            "states": (("view", "v", "u"), views.states),
-            "sharpness": (("view",), views.sharpness),
-        }
+
+    road = road_of(billboards)
+    views = view_textures_by_tile(
+        road,
+        taken_cameras(drive_frames),
+        depth_maps.sizes["taken"],
+        load,
+        plain=settings.sampling == "plain",
+        farthest=settings.farthest_view,
+        progress=lambda fraction: progress(0.9 * fraction),
     )
-    return dataset, {
+    return views_dataset(views), {
         "views": len(views.direction),
-        "views of a billboard": len(views.direction) / max(len(tiles), 1),
-        "raw bytes": 98_304 * len(tiles),
+        "views of a billboard": len(views.direction) / max(len(road.tile), 1),
+        "raw bytes": figures.RAW_BYTES * len(road.tile),
     }
-
-
-def _frames_that_see(
-    cameras: Cameras, frames: int, voxels: NDArray[np.float64], farthest: float
-) -> NDArray[np.int64]:
-    """Frames of which some camera has some voxel before it, not too far away."""
-    import numpy as np
-
-    from pipelines.geometry.cameras import project_points
-
-    seen = np.zeros(len(cameras.to_world), bool)
-    for number, pose in enumerate(cameras.to_world):
-        depth = project_points(cameras.intrinsics[number], pose, voxels)[1]
-        away = np.linalg.norm(voxels - pose[:3, 3], axis=1)
-        seen[number] = bool(((depth > 0) & (away < farthest)).any())
-    return np.flatnonzero(seen.reshape(frames, -1).any(axis=1))
-
-
-def _photographs(
-    drive: xr.Dataset, depths: xr.Dataset, points: xr.Dataset, frames: slice, farthest: float
-) -> Photographs:
-    """The photographs of some frames; where a depth is not known, the one of the points."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    import numba
-    import numpy as np
-
-    from pipelines.street_billboards.capture.surface_depth import surface_depth
-    from pipelines.street_billboards.textures.view_textures import Photographs
-
-    views = frame_views(drive, depths, frames)
-    places = views.poses[:, :3, 3]
-    positions = points["positions"].values
-    reach = farthest + 10.0
-    near = (positions > places.min(axis=0) - reach) & (positions < places.max(axis=0) + reach)
-    positions = positions[near.all(axis=1)]
-    _, height, width = views.depth.shape
-    depth, deviation = views.depth, views.deviation
-
-    def fill(number: int) -> None:
-        unknown = np.isnan(depth[number])
-        surface = surface_depth(
-            positions,
-            0.08,
-            views.intrinsics[number],
-            views.poses[number],
-            width,
-            height,
-            farthest=reach,
-        )
-        depth[number][unknown] = surface[unknown]
-        deviation[number][unknown] = 0.1
-
-    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
-        list(threads.map(fill, range(len(depth))))
-    return Photographs(
-        views.photographs, depth, deviation, views.intrinsics, views.poses, _codes(points, frames)
-    )

@@ -1,14 +1,55 @@
-"""What the points of a street hide from a camera: their depth map."""
+"""What the points of a street hide from a camera: their depth map, where stereo has none."""
 
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
+import numba
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.capture.point_fusion import FrameViews
+
 FloatArray = NDArray[np.float64]
+
+_POINT_SIDE = 0.08
+"""Metres that a point of the street is drawn with."""
+_DEVIATION = 0.1
+"""Metres, of a depth that is one of points."""
+_BEYOND = 10.0
+"""Metres beyond the farthest billboard, of points that may lie behind it."""
+
+
+def fill_unknown_depth(views: FrameViews, positions: FloatArray, *, farthest: float) -> None:
+    """Give pixels without a depth the one of the street's points (n, 3), in place.
+
+    inf where there are none, with a standard deviation of 0.1 m; farthest: metres from a camera to
+    the billboards that are asked about.
+    """
+    places = views.poses[:, :3, 3]
+    reach = farthest + _BEYOND
+    near = (positions > places.min(axis=0) - reach) & (positions < places.max(axis=0) + reach)
+    positions = positions[near.all(axis=1)]
+    _, height, width = views.depth.shape
+
+    def fill(number: int) -> None:
+        unknown = np.isnan(views.depth[number])
+        surface = surface_depth(
+            positions,
+            _POINT_SIDE,
+            views.intrinsics[number],
+            views.poses[number],
+            width,
+            height,
+            farthest=reach,
+        )
+        views.depth[number][unknown] = surface[unknown]
+        views.deviation[number][unknown] = _DEVIATION
+
+    with ThreadPoolExecutor(numba.get_num_threads()) as threads:
+        list(threads.map(fill, range(len(views.depth))))
 
 
 def surface_depth(

@@ -32,8 +32,6 @@ class SimulatedDrive(NamedTuple):
     """(c, 3, 3), pixels."""
     poses: FloatArray
     """(f, c, 4, 4), from the camera's axes to the world's."""
-    held_out: NDArray[np.bool_]
-    """(f,), every tenth frame is for measuring."""
     gains: FloatArray
     """(f, c), factors on linear light, about 1."""
 
@@ -82,7 +80,6 @@ def plan_drive(
     return SimulatedDrive(
         intrinsics=np.tile(np.array(camera, np.float64), (3, 1, 1)),
         poses=poses,
-        held_out=np.arange(frames) % 10 == 5,
         gains=slow[:, None] * own[None],
     )
 

@@ -59,11 +59,6 @@ def test_what_is_at_the_left_is_at_the_left_of_the_picture() -> None:
     assert edge == pytest.approx(37.5)
 
 
-def test_every_tenth_frame_is_held_out() -> None:
-    held_out = plan_drive(26, 3.0, 64, 40).held_out
-    assert np.flatnonzero(held_out).tolist() == [5, 15, 25]
-
-
 def test_gains_are_about_1_and_drift_slowly() -> None:
     gains = plan_drive(300, 1.0, 64, 40, exposure_spread=0.12).gains
     assert gains.shape == (300, 3)
