@@ -14,7 +14,8 @@ from assets_defs.checks import Check, figure_before
 from assets_defs.dagster_metadata import dagster_metadata
 from assets_defs.dagster_settings import config_class
 from assets_defs.memory import give_back_freed_memory
-from assets_defs.provenance import keys_of_partition, provenance
+from assets_defs.partitions import keys_of_partition
+from assets_defs.provenance import provenance
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
 from storage.errors import SchemaError

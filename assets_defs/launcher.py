@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 import dagster as dg
 
-from assets_defs.provenance import partition_key, provenance
+from assets_defs.partitions import partition_key
+from assets_defs.provenance import provenance
 from assets_defs.settings import Settings, resolve
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace

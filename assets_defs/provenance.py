@@ -1,16 +1,13 @@
-"""What a version was made of, and how its partition is called."""
+"""What a version was made of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
+from assets_defs.settings import Settings
 from assets_defs.sources import Source, json_hash
-from storage.versions import WHOLE
-
-if TYPE_CHECKING:
-    from assets_defs.settings import Settings
-    from assets_defs.system import AssetPlan
+from assets_defs.system import AssetPlan
 
 
 def provenance(
@@ -50,18 +47,3 @@ def provenance(
         "recipe": json_hash(plan.schema.number, plan.code, chosen, source, contents),
         "lineage": json_hash(chosen, source, lineages),
     }
-
-
-def partition_folder(keys: Mapping[str, str]) -> str:
-    """Folder name of a partition: keys in the order of their dimensions' names."""
-    return ".".join(keys[name] for name in sorted(keys)) or WHOLE
-
-
-def partition_key(keys: Mapping[str, str]) -> str:
-    """Dagster's partition key: keys in the order of their dimensions' names."""
-    return "|".join(keys[name] for name in sorted(keys))
-
-
-def keys_of_partition(key: str, by: Sequence[str], *, separator: str = "|") -> dict[str, str]:
-    """The keys by dimension that a partition key, or with ``.`` its folder's name, joins."""
-    return dict(zip(sorted(by), key.split(separator), strict=True))

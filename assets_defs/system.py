@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from assets_defs.checks import Check
 from assets_defs.code_version import code_version
-from assets_defs.provenance import keys_of_partition, partition_folder
+from assets_defs.partitions import keys_of_partition, partition_folder
 from assets_defs.settings import Settings, resolve
 from assets_defs.sources import Source
 from assets_defs.workspace import Workspace

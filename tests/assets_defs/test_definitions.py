@@ -20,11 +20,11 @@ from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.inbox import SETTLED_SECONDS
 from assets_defs.launcher import Request
 from assets_defs.neural_btf.graph import BTF
+from assets_defs.partitions import partition_key
 from assets_defs.photo_fur.graph import FUR
+from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.graph import STREET
-from assets_defs.provenance import partition_key
-from assets_defs.sources import Source
 from assets_defs.system import System
 from assets_defs.systems import SYSTEMS
 from storage.schemas import schemas_of
