@@ -34,7 +34,7 @@ from pipelines.photo_fur.frames import (
 )
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh
-from pipelines.virtual.pelt.pelt import virtual_pelt
+from pipelines.virtual.pelt.pelt import make_pelt
 from storage.readers.photographs import builtin_photograph
 
 LAYERS = 15
@@ -95,7 +95,7 @@ def _top_view() -> dict[str, Any]:
 def _depth() -> dict[str, Any]:
     correlations = []
     for seed in SEEDS:
-        pelt = virtual_pelt(PELT["size"], PELT["hairs"], PELT["samples"], seed)
+        pelt = make_pelt(PELT["size"], PELT["hairs"], PELT["samples"], seed)
         correlations.append(depth_rank_correlation(luminance(pelt.radiance), pelt.depth))
     return {
         "depth_rank_correlation": statistics.mean(correlations),

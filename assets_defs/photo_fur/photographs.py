@@ -95,10 +95,10 @@ def _read(source: Source, settings: PhotoSettings) -> NDArray[np.float32]:
 )
 def fur_photo(settings: PhotoSettings, source: Source, progress: Progress) -> Result:
     """Read the photograph, or photograph the virtual pelt."""
-    from pipelines.virtual.pelt.pelt import virtual_pelt
+    from pipelines.virtual.pelt.pelt import make_pelt
 
     if source.path is None and source.key == PELT:
-        radiance, depth = virtual_pelt(
+        radiance, depth = make_pelt(
             settings.pelt_size,
             settings.pelt_hairs,
             settings.pelt_samples,

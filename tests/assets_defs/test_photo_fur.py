@@ -162,7 +162,7 @@ REGRESSIONS = (
         lambda right, self, layers: np.linspace(self.brightest, self.darkest, layers + 1),
         KEYS,
     ),
-    Regression("depth_rank_correlation", virtual_pelt, "virtual_pelt", _shuffled_pelt, PELT_KEYS),
+    Regression("depth_rank_correlation", virtual_pelt, "make_pelt", _shuffled_pelt, PELT_KEYS),
     Regression("partition_error", attenuation, "layer_masks", _doubled_masks, KEYS),
     Regression("interval_error", attenuation, "layer_of", _linear_layers, KEYS),
     Regression(

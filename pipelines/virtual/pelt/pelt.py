@@ -52,31 +52,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.stats import qmc
 
-from pipelines.geometry.rays import build_scene, first_hits, occluded
+from pipelines.geometry.rays import first_hits, occluded
 from pipelines.virtual.pelt.hairs import FloatArray, Hairs, grow_hairs
-
-if TYPE_CHECKING:
-    from open3d.t.geometry import RaycastingScene
+from pipelines.virtual.pelt.prisms import PrismScene, build_prism_scene
+from pipelines.virtual.pelt.scattering import NUMBERS_PER_VERTEX, Scattered, scatter
 
 SKIN_ALBEDO = (0.26, 0.16, 0.085)
 SOURCE_EXPONENT = 2.0
-BACKSCATTER = 0.3
 BOUNCES = 2
 LENS_BLUR = 0.5  # standard deviation in pixels
 INDIRECT_STRIDE = 4
 WHITE_QUANTILE = 0.999
-SIDES = 3  # of a hair's prism
 PIXELS_PER_BLOCK = 1 << 17
-NUMBERS_PER_VERTEX = 5  # random: direction to the light (2), next direction (3)
-SKIN_CLEARANCE = 1e-5  # rays start at least this far above the skin: no skin shadows itself
 
 
 class Pelt(NamedTuple):
@@ -91,7 +84,7 @@ class Pelt(NamedTuple):
     depth: FloatArray
 
 
-def virtual_pelt(
+def make_pelt(
     size: int,
     hairs: int,
     samples: int,
@@ -114,7 +107,7 @@ def virtual_pelt(
     """
     rng = np.random.default_rng(seed)
     fur = grow_hairs(hairs, rng)
-    picture = photograph_pelt(fur, size, samples, rng, progress=progress)
+    picture = photograph_hairs(fur, size, samples, rng, progress=progress)
     white = max(float(np.quantile(picture.radiance.max(axis=-1), WHITE_QUANTILE)), 1e-6)
     return picture._replace(radiance=np.minimum(picture.radiance / np.float32(white), 1))
 
@@ -123,7 +116,7 @@ def virtual_pelt(
 # Photographing
 
 
-def photograph_pelt(
+def photograph_hairs(
     hairs: Hairs,
     size: int,
     samples: int,
@@ -153,7 +146,7 @@ def photograph_pelt(
     ):
         if value < least:
             raise ValueError(f"{name}: expected at least {least}, found {value}")
-    fur = _Fur.of(hairs, skin_albedo)
+    fur = build_prism_scene(hairs, skin_albedo)
     numbers = 2 + NUMBERS_PER_VERTEX * (bounces + 1)  # the first two: a place in the pixel
     sobol = qmc.Sobol(numbers, seed=rng).random_base2(math.ceil(math.log2(samples)))
     indirect_samples = math.ceil(samples / INDIRECT_STRIDE)
@@ -180,101 +173,6 @@ def photograph_pelt(
     return Pelt(blurred, depth.reshape(size, size))
 
 
-class _Fur(NamedTuple):
-    """Hairs of one tile with the copies around it that its rays can meet, ready for casting."""
-
-    scene: RaycastingScene
-    top: float  # height of the highest hair
-    fibres: _Fibres
-
-    @staticmethod
-    def of(hairs: Hairs, skin_albedo: tuple[float, float, float]) -> _Fur:
-        points = hairs.points.astype(np.float64)
-        count = points.shape[1]
-        tangents = np.gradient(points, axis=1) if len(points) else points
-        tangents /= np.maximum(np.linalg.norm(tangents, axis=-1, keepdims=True), 1e-12)
-        rings = _rings(points, hairs.radii, tangents)
-        top = float(rings[..., 2].max(initial=0.0))
-        # Every ray starts inside the tile, so the copies need to reach as far as a single ray flies
-        # through the fur. Margins of 2 and 4 times the height change the mean by 0.02 % (seen).
-        hair, copy_shift = _copies_in_reach(points, margin=top)
-        template = _prism_triangles(count)
-        prisms = np.arange(len(hair))[:, None, None] * (count * SIDES) + template
-        skin = 1e3 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-        vertices = (rings[hair] + copy_shift[:, None, None]).reshape(-1, 3)
-        triangles = prisms.reshape(-1, 3)
-        scene = build_scene(
-            np.concatenate([vertices, skin]),
-            np.concatenate([triangles, len(vertices) + np.array([(0, 1, 2), (0, 2, 3)])]),
-        )
-        segment = template.min(axis=1) // SIDES
-        fibres = _Fibres(
-            np.ascontiguousarray(hairs.points, np.float32),
-            tangents.astype(np.float32),
-            np.ascontiguousarray(hairs.radii, np.float32),
-            np.concatenate([hairs.albedo, [skin_albedo]]).astype(np.float32),
-            hair,
-            np.ascontiguousarray(copy_shift, np.float32),
-            segment,
-            (template // SIDES - segment[:, None]).astype(np.float32),
-        )
-        return _Fur(scene, top, fibres)
-
-
-class _Fibres(NamedTuple):
-    """What shading needs to know of a triangle: arrays only, for numba.
-
-    Triangle t < C * S belongs to copy t // S and there to row t % S of the prism's S triangles;
-    higher numbers are the skin.
-    """
-
-    points: FloatArray  # (H, P, 3)
-    tangents: FloatArray  # (H, P, 3)
-    radii: FloatArray  # (H, P)
-    albedo: FloatArray  # (H + 1, 3): hairs, skin
-    hair: np.ndarray  # (C,) hair of each copy
-    copy_shift: FloatArray  # (C, 3)
-    segment: np.ndarray  # (S,) the segment between points i and i + 1
-    towards_tip: FloatArray  # (S, 3) 1 for the triangle's corners at point i + 1, else 0
-
-
-def _rings(points: np.ndarray, radii: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-    """Corners of the prisms about hairs: (H, P, SIDES, 3)."""
-    side = np.cross(tangents, (0.0, 0.0, 1.0))
-    length = np.linalg.norm(side, axis=-1, keepdims=True)
-    side = np.where(length > 1e-6, side / np.maximum(length, 1e-6), (1.0, 0.0, 0.0))
-    ridge = np.cross(side, tangents)
-    angle = math.pi / 2 + 2 * math.pi * np.arange(SIDES)[:, None] / SIDES
-    spokes = side[:, :, None] * np.cos(angle) + ridge[:, :, None] * np.sin(angle)
-    rings: np.ndarray = points[:, :, None] + radii[:, :, None, None] * spokes
-    return rings
-
-
-def _prism_triangles(points: int) -> np.ndarray:
-    """Triangles of one open prism of ``points`` rings: (S, 3)."""
-    corner = np.arange(SIDES)
-    a = SIDES * np.arange(points - 1)[:, None] + corner
-    b = SIDES * np.arange(points - 1)[:, None] + (corner + 1) % SIDES
-    faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)
-    return faces.reshape(-1, 3)
-
-
-def _copies_in_reach(points: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find the periodic copies that come within ``margin`` of the tile: hair (C,), shift (C, 3)."""
-    low, high = points[..., :2].min(axis=1), points[..., :2].max(axis=1)
-    first = np.floor(-margin - high.max(axis=0, initial=0.0)).astype(int)
-    last = np.ceil(1 + margin - low.min(axis=0, initial=0.0)).astype(int)
-    hair, shift = [], []
-    for i in range(first[0], last[0] + 1):
-        for j in range(first[1], last[1] + 1):
-            tile = np.array([i, j, 0.0])
-            near = (high + tile[:2] >= -margin) & (low + tile[:2] <= 1 + margin)
-            found = np.flatnonzero(near.all(axis=1))
-            hair.append(found)
-            shift.append(np.broadcast_to(tile, (len(found), 3)))
-    return np.concatenate(hair), np.concatenate(shift)
-
-
 def _camera_origins(
     pixels: np.ndarray, size: int, place: np.ndarray | tuple[float, float], top: float
 ) -> FloatArray:
@@ -290,7 +188,7 @@ def _camera_height(top: float) -> float:
     return 1.01 * top + 1e-3
 
 
-def _depth(fur: _Fur, pixels: np.ndarray, size: int) -> np.ndarray:
+def _depth(fur: PrismScene, pixels: np.ndarray, size: int) -> np.ndarray:
     origins = _camera_origins(pixels, size, (0.5, 0.5), fur.top)
     distance = first_hits(fur.scene, origins, (0.0, 0.0, -1.0)).distance
     height: np.ndarray = _camera_height(fur.top) - distance.astype(np.float64)
@@ -299,7 +197,7 @@ def _depth(fur: _Fur, pixels: np.ndarray, size: int) -> np.ndarray:
 
 
 def _path_radiance(
-    fur: _Fur,
+    fur: PrismScene,
     origins: FloatArray,
     random: FloatArray,
     vertices: int,
@@ -317,9 +215,9 @@ def _path_radiance(
     throughput = np.ones((count, 3), np.float32)
     for vertex in range(vertices):
         hits = first_hits(fur.scene, origins, directions)
-        out = _Scattered(*(np.empty((count, 3), np.float32) for _ in _Scattered._fields))
+        out = Scattered(*(np.empty((count, 3), np.float32) for _ in Scattered._fields))
         numbers = random[NUMBERS_PER_VERTEX * vertex :][:NUMBERS_PER_VERTEX]
-        _scatter(*hits, origins, directions, numbers, source_exponent, fur.fibres, out)
+        scatter(hits, origins, directions, numbers, source_exponent, fur.fibres, out)
         lit = ~occluded(fur.scene, out.light_origin, out.light_direction)
         radiance += throughput * out.light_weight * lit[:, None]
         throughput *= out.next_weight
@@ -327,137 +225,3 @@ def _path_radiance(
             throughput *= np.float32(indirect_weight)
         origins, directions = out.next_origin, out.next_direction
     return radiance
-
-
-# --------------------------------------------------------------------------------------------
-# Scattering, one path vertex at a time
-
-
-class _Scattered(NamedTuple):
-    """What N path vertices send on, each (N, 3) float32."""
-
-    light_origin: FloatArray
-    light_direction: FloatArray
-    light_weight: FloatArray  # times visibility: the radiance towards the previous vertex
-    next_origin: FloatArray
-    next_direction: FloatArray
-    next_weight: FloatArray  # times the radiance from there: likewise
-
-
-@njit(cache=True, error_model="numpy")
-def _source_direction(u: float, v: float, exponent: float) -> tuple[float, float, float]:
-    """Draw a direction to the source with density (n + 1) / (2 pi) cos^n."""
-    z = u ** (1 / (exponent + 1))
-    r = math.sqrt(max(0.0, 1 - z * z))
-    return r * math.cos(2 * math.pi * v), r * math.sin(2 * math.pi * v), z
-
-
-@njit(cache=True, error_model="numpy")
-def _along(curves: FloatArray, hair: int, s: int, f: float) -> tuple[float, float, float]:
-    """Interpolate (H, P, 3) figures of a hair at the fraction f of its segment s."""
-    return (
-        (1 - f) * curves[hair, s, 0] + f * curves[hair, s + 1, 0],
-        (1 - f) * curves[hair, s, 1] + f * curves[hair, s + 1, 1],
-        (1 - f) * curves[hair, s, 2] + f * curves[hair, s + 1, 2],
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _exit_distance(radius: float, sine: float) -> float:
-    """How far a ray from a tube's axis has to go to be outside; bounded along the tube."""
-    return 1.02 * radius / max(sine, 0.15)
-
-
-@njit(cache=True, error_model="numpy")
-def _scatter(
-    distance: FloatArray,
-    triangle: NDArray[np.int64],
-    barycentric: FloatArray,
-    origins: FloatArray,
-    directions: FloatArray,
-    random: FloatArray,
-    exponent: float,
-    fibres: _Fibres,
-    out: _Scattered,
-) -> None:
-    """Fill ``out`` for each ray's first hit; random numbers (NUMBERS_PER_VERTEX, N)."""
-    faces = len(fibres.segment)
-    hair_triangles = faces * len(fibres.hair)
-    source_weight = math.pi * (exponent + 2) / (exponent + 1)  # radiance over density
-    for i in range(len(triangle)):
-        lx, ly, lz = _source_direction(random[0, i], random[1, i], exponent)
-        # A point of the unit disc: lifted to the hemisphere it is cosine-distributed; its x alone
-        # is the cosine to the fibre of directions with density sin t (the semicircle law), and
-        # its y, in units of the chord there, is uniform.
-        r = math.sqrt(random[2, i])
-        a, b = r * math.cos(2 * math.pi * random[3, i]), r * math.sin(2 * math.pi * random[3, i])
-        chord = math.sqrt(max(1e-6, 1 - a * a))
-        if triangle[i] < 0:  # the source, whose light has been sampled before: the path ends
-            px, py, pz = 0.0, 0.0, 0.0
-            nx, ny, nz = 0.0, 0.0, 1.0
-            light, goes_on = 0.0, 0.0
-            light_start = next_start = 0.0
-            row = 0
-        elif triangle[i] >= hair_triangles:
-            px = origins[i, 0] + distance[i] * directions[i, 0]
-            py = origins[i, 1] + distance[i] * directions[i, 1]
-            pz = 0.0
-            nx, ny, nz = a, b, math.sqrt(max(0.0, 1 - a * a - b * b))
-            light, goes_on = source_weight * lz / math.pi, 1.0
-            light_start = next_start = 0.0
-            row = len(fibres.albedo) - 1
-        else:
-            copy = triangle[i] // faces
-            face = triangle[i] - copy * faces
-            hair, s = fibres.hair[copy], fibres.segment[face]
-            f = 0.0
-            for corner in range(3):
-                f += barycentric[i, corner] * fibres.towards_tip[face, corner]
-            px, py, pz = _along(fibres.points, hair, s, f)
-            px, py = px + fibres.copy_shift[copy, 0], py + fibres.copy_shift[copy, 1]
-            tx, ty, tz = _along(fibres.tangents, hair, s, f)
-            scale = 1 / math.sqrt(tx * tx + ty * ty + tz * tz)
-            tx, ty, tz = scale * tx, scale * ty, scale * tz
-            radius = (1 - f) * fibres.radii[hair, s] + f * fibres.radii[hair, s + 1]
-            row = hair
-            # Across the fibre: u towards the viewer, v = t x u.
-            vx, vy, vz = -directions[i, 0], -directions[i, 1], -directions[i, 2]
-            cosine = tx * vx + ty * vy + tz * vz
-            ux, uy, uz = vx - cosine * tx, vy - cosine * ty, vz - cosine * tz
-            scale = 1 / math.sqrt(max(1e-12, ux * ux + uy * uy + uz * uz))
-            ux, uy, uz = scale * ux, scale * uy, scale * uz
-            vx, vy, vz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
-            # Light from the source: the cosine of its azimuth p is (u . l) / sin t.
-            cosine = tx * lx + ty * ly + tz * lz
-            sine = math.sqrt(max(1e-6, 1 - cosine * cosine))
-            lobe = sine + BACKSCATTER * (ux * lx + uy * ly + uz * lz)
-            light, goes_on = source_weight * lobe / math.pi**2, 1.0
-            light_start = _exit_distance(radius, sine)
-            # Light from other hairs: p is uniform so far. Turning cos p round with probability
-            # (1 - BACKSCATTER cos p) / 2 leaves the density 1 + BACKSCATTER cos p, and weight 1.
-            azimuth = math.pi * b / chord
-            cu, cv = chord * math.cos(azimuth), chord * math.sin(azimuth)
-            if 2 * random[4, i] > 1 + BACKSCATTER * math.cos(azimuth):
-                cu = -cu
-            nx = a * tx + cu * ux + cv * vx
-            ny = a * ty + cu * uy + cv * vy
-            nz = a * tz + cu * uz + cv * vz
-            next_start = _exit_distance(radius, chord)
-        # Both go on from inside the tile, around which there are copies on all sides.
-        x, y = px + light_start * lx, py + light_start * ly
-        out.light_origin[i, 0] = x - math.floor(x)
-        out.light_origin[i, 1] = y - math.floor(y)
-        out.light_origin[i, 2] = max(pz + light_start * lz, SKIN_CLEARANCE)
-        out.light_direction[i, 0] = lx
-        out.light_direction[i, 1] = ly
-        out.light_direction[i, 2] = lz
-        x, y = px + next_start * nx, py + next_start * ny
-        out.next_origin[i, 0] = x - math.floor(x)
-        out.next_origin[i, 1] = y - math.floor(y)
-        out.next_origin[i, 2] = max(pz + next_start * nz, SKIN_CLEARANCE)
-        out.next_direction[i, 0] = nx
-        out.next_direction[i, 1] = ny
-        out.next_direction[i, 2] = nz
-        for channel in range(3):
-            out.light_weight[i, channel] = light * fibres.albedo[row, channel]
-            out.next_weight[i, channel] = goes_on * fibres.albedo[row, channel]

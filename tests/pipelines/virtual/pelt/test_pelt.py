@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 
 from pipelines.geometry import rays
-from pipelines.virtual.pelt import pelt as module
-from pipelines.virtual.pelt.pelt import (
-    BACKSCATTER,
-    Hairs,
-    grow_hairs,
-    photograph_pelt,
-    virtual_pelt,
-)
+from pipelines.virtual.pelt import prisms
+from pipelines.virtual.pelt.hairs import Hairs, grow_hairs
+from pipelines.virtual.pelt.pelt import Pelt, make_pelt, photograph_hairs
+from pipelines.virtual.pelt.scattering import BACKSCATTER
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 NO_HAIRS = Hairs(*(np.zeros(shape, np.float32) for shape in ((0, 4, 3), (0, 4), (0, 3))))
@@ -36,8 +32,8 @@ def straight_hair(height: float, radius: float, albedo: tuple[float, float, floa
 
 
 @pytest.fixture(scope="module")
-def pelt() -> module.Pelt:
-    return virtual_pelt(64, 300, 16, 3)
+def pelt() -> Pelt:
+    return make_pelt(64, 300, 16, 3)
 
 
 # --------------------------------------------------------------------------------------------
@@ -59,7 +55,7 @@ def test_picture_and_depth_are_well_formed(pelt) -> None:
 
 
 def test_equal_arguments_give_equal_bits_and_other_seeds_other_fur() -> None:
-    first, again, other = (virtual_pelt(24, 60, 4, seed) for seed in (1, 1, 2))
+    first, again, other = (make_pelt(24, 60, 4, seed) for seed in (1, 1, 2))
     for a, b, c in zip(first, again, other, strict=True):
         np.testing.assert_array_equal(a, b)
         assert np.mean(a != c) > 0.5
@@ -67,7 +63,7 @@ def test_equal_arguments_give_equal_bits_and_other_seeds_other_fur() -> None:
 
 def test_progress_rises_to_one() -> None:
     done: list[float] = []
-    virtual_pelt(8, 20, 6, 0, progress=done.append)
+    make_pelt(8, 20, 6, 0, progress=done.append)
     assert len(done) == 6
     assert done[-1] == pytest.approx(1)
     assert all(a < b for a, b in zip([0.0, *done], done, strict=False))
@@ -85,7 +81,7 @@ def test_brightness_mostly_falls_with_depth(pelt) -> None:
 @pytest.mark.parametrize("arguments", [(0, 10, 1), (8, 0, 1), (8, 10, 0)])
 def test_empty_requests_are_refused(arguments) -> None:
     with pytest.raises(ValueError, match="at least 1, found 0"):
-        virtual_pelt(*arguments, seed=0)
+        make_pelt(*arguments, seed=0)
 
 
 # --------------------------------------------------------------------------------------------
@@ -128,9 +124,9 @@ def test_depth_is_the_first_triangle_below_each_pixel(monkeypatch) -> None:
         meshes.append((np.asarray(vertices, np.float64), triangles))
         return rays.build_scene(vertices, triangles)
 
-    monkeypatch.setattr(module, "build_scene", keep)
+    monkeypatch.setattr(prisms, "build_scene", keep)
     size = 48
-    depth = photograph_pelt(grow_hairs(40, generator()), size, 1, generator()).depth
+    depth = photograph_hairs(grow_hairs(40, generator()), size, 1, generator()).depth
     corners = meshes[0][0][meshes[0][1]]
     top = corners[..., 2].max()
     rng = generator()
@@ -155,7 +151,7 @@ def test_depth_is_the_first_triangle_below_each_pixel(monkeypatch) -> None:
 def test_depth_of_a_lone_hair_is_that_of_its_prism() -> None:
     """A triangular prism with its ridge up: the height falls with slope sqrt(3) from the ridge."""
     size, height, radius = 64, 0.3, 0.1
-    picture = photograph_pelt(straight_hair(height, radius, (1, 1, 1)), size, 1, generator())
+    picture = photograph_hairs(straight_hair(height, radius, (1, 1, 1)), size, 1, generator())
     away = np.abs((np.arange(size) + 0.5) / size - 0.5)
     top = height + radius
     expected = np.where(away < math.sqrt(3) / 2 * radius, math.sqrt(3) * away / top, 1.0)
@@ -177,7 +173,7 @@ def test_moving_the_fur_by_pixels_rolls_the_picture() -> None:
     points[..., :2] += shift
     assert (np.ptp(shift, axis=0) > 0.5).all()  # some did cross the border
     still, moved = (
-        photograph_pelt(h, size, 32, generator()) for h in (hairs, hairs._replace(points=points))
+        photograph_hairs(h, size, 32, generator()) for h in (hairs, hairs._replace(points=points))
     )
     expected = np.roll(still.depth, (down, right), axis=(0, 1))
     assert np.mean(np.abs(moved.depth - expected) > 1e-3) < 0.01
@@ -188,7 +184,7 @@ def test_moving_the_fur_by_pixels_rolls_the_picture() -> None:
 
 def test_no_seam_at_the_border() -> None:
     """Neighbours across the border differ as much as neighbours inside."""
-    pelt = virtual_pelt(96, 400, 8, 4)
+    pelt = make_pelt(96, 400, 8, 4)
     for picture in (pelt.radiance @ LUMINANCE, pelt.depth):
         for axis in (0, 1):
             step = np.abs(picture - np.roll(picture, 1, axis=axis)).mean(axis=1 - axis)
@@ -202,7 +198,7 @@ def test_no_seam_at_the_border() -> None:
 
 @pytest.mark.parametrize("exponent", [0.0, 2.0, 20.0])
 def test_open_white_skin_has_radiance_one(exponent) -> None:
-    picture = photograph_pelt(
+    picture = photograph_hairs(
         NO_HAIRS, 32, 16, generator(), source_exponent=exponent, skin_albedo=(1, 0.5, 0.25)
     )
     np.testing.assert_allclose(picture.radiance.mean(axis=(0, 1)), (1, 0.5, 0.25), rtol=5e-3)
@@ -216,7 +212,7 @@ def test_lone_hair_has_the_closed_form_of_its_scattering() -> None:
     2 cos^2(zenith) (1 + g cos p) sin t is 2 (3 pi / 8) (pi / 2 + 4 g / 3), over pi^2.
     """
     albedo = (0.9, 0.6, 0.3)
-    picture = photograph_pelt(
+    picture = photograph_hairs(
         straight_hair(0.3, 0.08, albedo), 64, 32, generator(), source_exponent=2, bounces=0
     )
     ridge = picture.radiance[30:34].mean(axis=(0, 1))
@@ -231,7 +227,7 @@ def test_shadow_of_a_lone_hair_has_its_closed_form() -> None:
     3/4 (S(a2) - S(a1)), S = sin - sin^3 / 3, of what a cos^2 source sends to the skin.
     """
     size, height, radius = 64, 0.15, 0.06
-    picture = photograph_pelt(
+    picture = photograph_hairs(
         straight_hair(height, radius, (0, 0, 0)),
         size,
         64,
@@ -263,7 +259,7 @@ def test_white_fur_under_an_even_sky_vanishes() -> None:
     white = hairs._replace(albedo=np.ones_like(hairs.albedo), radii=0.1 * hairs.radii)
     means = []
     for bounces in (0, 2, 25):
-        picture = photograph_pelt(
+        picture = photograph_hairs(
             white,
             24,
             64,
@@ -282,7 +278,7 @@ def test_nothing_is_brighter_than_the_source() -> None:
     hairs = grow_hairs(150, generator())
     white = hairs._replace(albedo=np.ones_like(hairs.albedo))
     for exponent in (0.0, 2.0):
-        picture = photograph_pelt(
+        picture = photograph_hairs(
             white, 24, 64, generator(), source_exponent=exponent, skin_albedo=(1, 1, 1)
         )
         assert picture.radiance.max() < (exponent + 2) / 2 * 1.1  # a tenth for the noise
@@ -292,12 +288,12 @@ def test_nothing_is_brighter_than_the_source() -> None:
 def test_another_source_changes_the_light_and_not_the_depth() -> None:
     hairs = grow_hairs(150, generator())
     wide, narrow = (
-        photograph_pelt(hairs, 32, 32, generator(), source_exponent=n, bounces=0)
+        photograph_hairs(hairs, 32, 32, generator(), source_exponent=n, bounces=0)
         for n in (0.0, 60.0)
     )
     np.testing.assert_array_equal(wide.depth, narrow.depth)
 
-    def correlation(picture: module.Pelt) -> float:
+    def correlation(picture: Pelt) -> float:
         ranks = [
             np.argsort(np.argsort(a.ravel()))
             for a in (picture.radiance @ LUMINANCE, -picture.depth)
