@@ -1,4 +1,7 @@
-"""Run one benchmark: ``python -m benchmarks fur``, ``python -m benchmarks btf --scale paper``."""
+"""Run one benchmark: ``python -m benchmarks fur``, ``python -m benchmarks btf --scale paper``.
+
+``python -m benchmarks contents STORE STORE`` compares what two stores hold.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-NAMES = ("btf", "fur", "scratches", "ssdf", "street")
+NAMES = ("btf", "contents", "fur", "house", "scratches", "ssdf", "street")
 SCALES = ("default", "paper")
 
 
@@ -43,14 +46,18 @@ def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks")
     parser.add_argument("name", choices=NAMES)
+    parser.add_argument("stores", nargs="*", help="contents: two stores, or lists of hashes")
     parser.add_argument(
         "--scale", choices=SCALES, default="default", help="paper: an hour, where there is one"
     )
     arguments = parser.parse_args()
     run = importlib.import_module(f"benchmarks.{arguments.name}").run
-    if "scale" not in inspect.signature(run).parameters and arguments.scale != "default":
+    wanted = inspect.signature(run).parameters
+    if "scale" not in wanted and arguments.scale != "default":
         parser.error(f"{arguments.name} has no scale {arguments.scale!r}; expected 'default'.")
-    figures = run(arguments.scale) if "scale" in inspect.signature(run).parameters else run()
+    if len(arguments.stores) != (2 if arguments.name == "contents" else 0):
+        parser.error("two stores go with contents, and none with another name.")
+    figures = run(arguments.scale) if "scale" in wanted else run(*arguments.stores)
     print(json.dumps(figures | {"commit": commit(), "machine": machine()}))
 
 
