@@ -1,7 +1,8 @@
 #!/bin/sh
 # Makes sure that what the Python wheels expect from the system is there: EGL and a Mesa driver to
 # draw without a screen (VTK), libusb and libgomp (Open3D); and venv, which Debian keeps apart.
-# Installs what is missing as root with apt; otherwise says the one command that does.
+# Installs what is missing as root with apt; otherwise says the one command that does. The compiler
+# that tests the shaders is only tried to be had: without it, these tests say so.
 set -eu
 
 exists() { for path in "$@"; do [ -e "$path" ] && return 0; done; return 1; }
@@ -22,7 +23,14 @@ has libusb-1.0.so.0 || packages="$packages libusb-1.0-0"
 has libgomp.so.1 || packages="$packages libgomp1"
 has libX11.so.6 || packages="$packages libx11-6"
 has libXrender.so.1 || packages="$packages libxrender1"
-[ -z "$packages" ] && exit 0
+
+try_shader_compiler() {
+    if [ "$(id -u)" = 0 ] && ! command -v glslangValidator >/dev/null; then
+        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+            -o Acquire::Retries=0 -o Acquire::http::Timeout=10 glslang-tools >/dev/null 2>&1 || true
+    fi
+}
+[ -z "$packages" ] && { try_shader_compiler; exit 0; }
 
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "Installing system packages:$packages"
@@ -30,6 +38,7 @@ if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     apt-get update -qq
     # shellcheck disable=SC2086  # a list of names
     apt-get install -y -qq --no-install-recommends $packages >/dev/null
+    try_shader_compiler
 elif command -v apt-get >/dev/null; then
     echo "System packages are missing; install them with: sudo apt-get install -y$packages" >&2
     exit 1
