@@ -6,6 +6,8 @@ street, z up from the pavement.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pipelines.virtual.city.parts import (
@@ -44,6 +46,27 @@ _STRONG: tuple[Colour, ...] = (
 _DEPTH_OF_HOUSE = 8.0
 
 
+class _Front(NamedTuple):
+    """Measures of a house's front, metres, and what it is made of."""
+
+    width: float
+    ground: float  # height of the ground floor
+    storey: float  # height of each floor above
+    floors: int  # above the ground floor
+    windows: int  # of a floor, side by side
+    wall: Look
+    trim: Look  # reveals, sills, cornices
+    frame: Look  # of windows
+
+    @property
+    def height(self) -> float:
+        return self.ground + self.floors * self.storey + 0.5
+
+    def openings(self, wide: float) -> np.ndarray:
+        """Left edges (windows,) of openings of one width, each in the middle of its cell."""
+        return (np.arange(self.windows) + 0.5) * (self.width / self.windows) - wide / 2
+
+
 def _one_of(generator: Generator, choices: tuple[Colour, ...]) -> Colour:
     colour = np.asarray(choices[generator.integers(len(choices))])
     r, g, b = np.clip(
@@ -64,13 +87,14 @@ def house(width: float, generator: Generator) -> Part:
     frame = Look("paint", _one_of(generator, _FRAMES))
     floors = int(generator.integers(2, 4))
     ground, storey = generator.uniform(3.3, 3.9), generator.uniform(2.7, 3.1)
-    height = ground + floors * storey + 0.5
-    count = max(2, round(width / generator.uniform(2.0, 2.9)))
-    parts = [_upper_floors(width, ground, storey, floors, count, wall, trim, frame, generator)]
+    windows = max(2, round(width / generator.uniform(2.0, 2.9)))
+    front = _Front(width, ground, storey, floors, windows, wall, trim, frame)
+    height = front.height
+    parts = [_upper_floors(front, generator)]
     if generator.random() < 0.5:
         parts.append(_shop(width, ground, trim, generator))
     else:
-        parts.append(_dwelling(width, ground, count, wall, trim, frame, generator))
+        parts.append(_dwelling(front, generator))
     parts.append(box((0, -0.1, ground - 0.12), (width, 0, ground + 0.12), trim, faces="-x+x-y-z+z"))
     parts.append(box((0, -0.3, height - 0.3), (width, 0, height), trim, faces="-x+x-y-z+z"))
     parts.append(_body(width, height, wall, generator))
@@ -117,39 +141,29 @@ def _body(width: float, height: float, wall: Look, generator: Generator) -> Part
     return joined(parts)
 
 
-def _upper_floors(
-    width: float,
-    ground: float,
-    storey: float,
-    floors: int,
-    count: int,
-    wall: Look,
-    trim: Look,
-    frame: Look,
-    generator: Generator,
-) -> Part:
-    cell = width / count
-    opening = min(generator.uniform(1.0, 1.5), cell - 0.6)
+def _upper_floors(front: _Front, generator: Generator) -> Part:
+    opening = min(generator.uniform(1.0, 1.5), front.width / front.windows - 0.6)
     tall = generator.uniform(1.5, 1.8)
-    lefts = (np.arange(count) + 0.5) * cell - opening / 2
-    bottoms = ground + np.arange(floors) * storey + 0.85
-    xs = np.concatenate([[0.0], np.stack([lefts, lefts + opening], axis=1).ravel(), [width]])
+    lefts = front.openings(opening)
+    bottoms = front.ground + np.arange(front.floors) * front.storey + 0.85
+    xs = np.concatenate([[0.0], np.stack([lefts, lefts + opening], axis=1).ravel(), [front.width]])
     heights = np.stack([bottoms, bottoms + tall], axis=1).ravel()
-    zs = np.concatenate([[ground], heights, [ground + floors * storey + 0.5]])
+    zs = np.concatenate([[front.ground], heights, [front.height]])
     holes = np.zeros((len(zs) - 1, len(xs) - 1), np.bool_)
     holes[1::2, 1::2] = True
     x, z = np.meshgrid(lefts, bottoms)
     places = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3)
     looks = generator.random(len(places)) < 0.35
     style = int(generator.integers(0, 3))
-    parts = [wall_with_holes(xs, zs, holes, wall)]
+    parts = [wall_with_holes(xs, zs, holes, front.wall)]
     for lit, chosen in ((0.4, places[looks]), (1.0, places[~looks])):
         if len(chosen):
-            unit = window(opening, tall, trim, frame, style=style, lit=lit)
+            unit = window(opening, tall, front.trim, front.frame, style=style, lit=lit)
             parts.append(copies(unit, chosen))
     if generator.random() < 0.3 and opening > 1.1:
-        rail = _balcony(opening + 0.5, trim)
-        at = places[: count * (floors - 1) + 1 : max(2, count)] - [0.25, 0, 0.55]
+        rail = _balcony(opening + 0.5, front.trim)
+        last = front.windows * (front.floors - 1) + 1
+        at = places[: last : max(2, front.windows)] - [0.25, 0, 0.55]
         parts.append(copies(rail, at))
     return joined(parts)
 
@@ -200,34 +214,26 @@ def _balcony(width: float, trim: Look) -> Part:
     return joined(parts)
 
 
-def _dwelling(
-    width: float,
-    ground: float,
-    count: int,
-    wall: Look,
-    trim: Look,
-    frame: Look,
-    generator: Generator,
-) -> Part:
+def _dwelling(front: _Front, generator: Generator) -> Part:
     """A ground floor with a door and windows, on a plinth of stone."""
-    cell = width / count
-    door = int(generator.integers(count))
-    opening = min(1.25, cell - 0.6)
-    left = (np.arange(count) + 0.5) * cell - opening / 2
-    sill, head = 0.95, min(2.5, ground - 0.5)
-    xs = np.concatenate([[0.0], np.stack([left, left + opening], axis=1).ravel(), [width]])
-    zs = [0.0, sill, head, ground]
+    door = int(generator.integers(front.windows))
+    opening = min(1.25, front.width / front.windows - 0.6)
+    left = front.openings(opening)
+    sill, head = 0.95, min(2.5, front.ground - 0.5)
+    xs = np.concatenate([[0.0], np.stack([left, left + opening], axis=1).ravel(), [front.width]])
+    zs = [0.0, sill, head, front.ground]
     holes = np.zeros((3, len(xs) - 1), np.bool_)
     holes[1, 1::2] = True
     holes[0, 1 + 2 * door] = True
     others = np.delete(left, door)
     places = np.stack([others, 0 * others, np.full_like(others, sill)], axis=-1)
-    parts = [wall_with_holes(xs, zs, holes, wall)]
+    parts = [wall_with_holes(xs, zs, holes, front.wall)]
     if len(places):
-        parts.append(copies(window(opening, head - sill, trim, frame, style=2), places))
-    parts.append(placed(_door(opening, head, trim, generator), (left[door], 0, 0)))
+        glazed = window(opening, head - sill, front.trim, front.frame, style=2)
+        parts.append(copies(glazed, places))
+    parts.append(placed(_door(opening, head, front.trim, generator), (left[door], 0, 0)))
     stone = Look("paving", (0.3, 0.29, 0.27))
-    for a, b in ((0.0, left[door]), (left[door] + opening, width)):
+    for a, b in ((0.0, left[door]), (left[door] + opening, front.width)):
         parts.append(box((a, -0.05, 0), (b, 0, 0.5), stone, faces="-x+x-y+z"))
     return joined(parts)
 
