@@ -14,7 +14,7 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.system import Pictures, Progress, Result
 from pipelines.photo_fur import figures
 from pipelines.photo_fur.attenuation import Tails
-from pipelines.photo_fur.drawing import Fill
+from pipelines.photo_fur.stage_view import Fill
 from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 

@@ -8,7 +8,7 @@ order of the method:
 2. ``attenuation``: how light decays from the tips to the skin (``fit_attenuation``), and with that
    the layer of every pixel (``layer_of``, ``make_shell_stack``) and the shader's ``depth_code``.
 3. ``shells``: a mesh's vertices offset along its normals, one set a layer (``make_shell_mesh``).
-4. ``drawing``: all shells as one actor for ``drawing.stage`` (``fur_texture``, ``fur_surface``);
+4. ``stage_view``: all shells as one actor for ``drawing.stage`` (``fur_texture``, ``fur_surface``);
    ``frames``: pictures of it from several views (``draw_frames``).
 
 ``pictures`` shows the histogram and the layers; ``figures`` tells whether results are right.

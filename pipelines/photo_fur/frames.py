@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, fitting_distance, orbit
 from pipelines.photo_fur.attenuation import Tails
-from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.shells import ShellMesh
+from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
 
 BACKGROUND = (0.32, 0.34, 0.37)
 LEAST_SIDE = 384

@@ -17,7 +17,7 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.shapes import sphere, square
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
-from pipelines.ssdf_lighting.drawing.ray_traced import ray_traced
+from pipelines.ssdf_lighting.drawing.ray_tracing import ray_traced
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
 from pipelines.ssdf_lighting.scene import LitMesh

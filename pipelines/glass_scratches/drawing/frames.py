@@ -13,7 +13,7 @@ from pipelines.drawing.stage import Camera, fitting_distance, orbit
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing.path_tracing import Picture, Surface, trace
-from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw
+from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw_scratched
 from pipelines.light.built_in_environments import uniform
 from pipelines.light.environment_maps import rotate_environment, solid_angles
 from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
@@ -88,7 +88,7 @@ def trace_frames(
         for number, camera in enumerate(views)
     ]
     stage = [
-        draw(actor, light, camera, width=size, height=size, supersampling=2)[..., :3]
+        draw_scratched(actor, light, camera, width=size, height=size, supersampling=2)[..., :3]
         for camera in views
     ]
     return Frames(traced[0], traced[1], np.stack(stage))
@@ -125,6 +125,6 @@ def moving_light(
         turned = make_environment_sampler(
             rotate_environment(light.radiance, 360.0 * number / count)
         )
-        drawn = draw(actor, turned, camera, width=size, height=size, supersampling=2)
+        drawn = draw_scratched(actor, turned, camera, width=size, height=size, supersampling=2)
         pictures.append(drawn[..., :3])
     return to_8bit(np.stack(pictures) * exposure(light))

@@ -103,7 +103,7 @@ class ScratchedActor:
         )
 
 
-def draw(
+def draw_scratched(
     actor: ScratchedActor,
     environment: EnvironmentSampler,
     camera: Camera,

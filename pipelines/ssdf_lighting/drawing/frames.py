@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, fitting_distance, orbit, surface
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
-from pipelines.ssdf_lighting.drawing.ray_traced import Traced, ray_traced
+from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
@@ -72,7 +72,7 @@ def draw_turning_light(
     ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
     """
     split = split_by_part(scene)
-    actor = LitActor(*split.mesh, lights)
+    actor = LitActor(split.mesh, lights)
     pictures, seconds = [], []
     with Stage(*size, background=_BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Camera, Stage, surface, texture
@@ -29,6 +29,7 @@ from pipelines.ssdf_lighting.light.lobe_axes import AxisTables, lobe_axes
 from pipelines.ssdf_lighting.light.microfacets import LEAST_VIEW, Materials
 from pipelines.ssdf_lighting.light.shading import LobeTables, lobe_tables
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
+from pipelines.ssdf_lighting.scene import LitMesh
 
 MOST_LIGHTS = 24
 """Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
@@ -40,8 +41,6 @@ _GLOSS_VALUES = {"LEAST_VIEW": LEAST_VIEW, "GLOSS_COLUMNS": GLOSS_COLUMNS}
 class LitActor:
     """A mesh on the stage, lit by N <= 24 spherical Gaussians.
 
-    vertices, normals: (V, 3), normals of length 1; triangles: (F, 3), each inside one object.
-    object_of_vertex: (V,) rows of ``materials``.
     lights: those of the first frame; others of the same number may follow.
 
     ``actors`` are for ``Stage.add``: all that is glossy, then all that is not. Software renderers
@@ -49,32 +48,24 @@ class LitActor:
     more lights, as ``lobe_tables`` does, and for objects that have no material.
     """
 
-    def __init__(
-        self,
-        vertices: ArrayLike,
-        triangles: ArrayLike,
-        normals: ArrayLike,
-        object_of_vertex: ArrayLike,
-        materials: Materials,
-        lights: Lights,
-    ) -> None:
+    def __init__(self, mesh: LitMesh, lights: Lights) -> None:
         count = len(lights.sharpness)
         if not 1 <= count <= MOST_LIGHTS:
             raise ValueError(f"there are {count} lights; expected 1 to {MOST_LIGHTS} on the stage.")
-        objects = np.asarray(object_of_vertex)
+        objects, materials = np.asarray(mesh.object_of_vertex), mesh.materials
         if objects.size and not 0 <= objects.min() <= objects.max() < len(materials.specular):
             raise ValueError(
                 f"object_of_vertex: found {objects.min()} to {objects.max()}, expected rows of "
                 f"{len(materials.specular)} materials."
             )
         self._materials = materials
-        self._points = np.ascontiguousarray(vertices, np.float32)
-        self._normals = np.ascontiguousarray(normals, np.float32)
+        self._points = np.ascontiguousarray(mesh.vertices, np.float32)
+        self._normals = np.ascontiguousarray(mesh.normals, np.float32)
         self._objects = objects.astype(np.int32)
         self._sharpness = np.array(lights.sharpness)
         tables = lobe_tables(materials, lights)
         self._axis_tables = AxisTables(tables, materials.specular > 0)
-        corners = np.asarray(triangles)
+        corners = np.asarray(mesh.triangles)
         glossy = materials.specular[objects[corners[:, 0]]] > 0
         self._parts = [
             _Part(

@@ -89,7 +89,7 @@ def numpy_picture(scene: Scene, look: Lights, camera: Camera) -> NDArray[np.floa
 @pytest.mark.parametrize("count", [1, 5, 16, MOST_LIGHTS])
 def test_the_shader_shows_what_numpy_computes(scene: Scene, count: int) -> None:
     look = lights(count)
-    actor = LitActor(*scene, MATERIALS, look)
+    actor = LitActor(LitMesh(*scene, MATERIALS), look)
     assert len(actor.actors) == 2
     drawn = draw_lit(SIZE, actor, NEAR, look, distances(scene))
     check_equal(drawn, numpy_picture(scene, look, NEAR))
@@ -97,7 +97,7 @@ def test_the_shader_shows_what_numpy_computes(scene: Scene, count: int) -> None:
 
 def test_nothing_of_an_earlier_frame_stays(scene: Scene) -> None:
     """Other lights, wider and elsewhere, and another view, on the same stage."""
-    actor = LitActor(*scene, MATERIALS, lights(6, seed=1))
+    actor = LitActor(LitMesh(*scene, MATERIALS), lights(6, seed=1))
     parallel = orbit((0.0, 0.0, 0.7), 8.0, 30.0, 40.0, height=3.5)
     with Stage(*SIZE) as stage:
         stage.add(*actor.actors)
@@ -117,7 +117,7 @@ def test_hidden_sky_is_seen(scene: Scene) -> None:
             d[:, first] -= 1.0
             return d
 
-        actor = LitActor(*scene, MATERIALS, look)
+        actor = LitActor(LitMesh(*scene, MATERIALS), look)
         drawn = draw_lit(SIZE, actor, NEAR, look, moved)
         expected = render_numpy(LitMesh(*scene, MATERIALS), moved, look, NEAR, SIZE)
         check_equal(drawn, expected)
@@ -126,10 +126,10 @@ def test_hidden_sky_is_seen(scene: Scene) -> None:
 
 def test_what_does_not_fit_is_refused(scene: Scene) -> None:
     with pytest.raises(ValueError, match="there are 25 lights; expected 1 to 24"):
-        LitActor(*scene, MATERIALS, lights(25))
+        LitActor(LitMesh(*scene, MATERIALS), lights(25))
     with pytest.raises(ValueError, match="object_of_vertex: found 0 to 2, expected rows of 2"):
-        LitActor(*scene._replace(objects=scene.objects * 2), MATERIALS, lights(3))
-    actor = LitActor(*scene, MATERIALS, lights(3))
+        LitActor(LitMesh(*scene._replace(objects=scene.objects * 2), MATERIALS), lights(3))
+    actor = LitActor(LitMesh(*scene, MATERIALS), lights(3))
     with pytest.raises(ValueError, match="there are 4 lights; expected 3"):
         actor.relight(NEAR, lights(4), distances(scene))
     with pytest.raises(ValueError, match="distances: found shape"):

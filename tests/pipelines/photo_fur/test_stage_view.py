@@ -18,7 +18,6 @@ from pipelines.photo_fur.attenuation import (
     layer_masks,
     layer_of,
 )
-from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
 from pipelines.photo_fur.figures import top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
@@ -31,6 +30,7 @@ from pipelines.photo_fur.frames import (
 )
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.shells import ShellMesh, shell_vertices
+from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
 
 FILLS: tuple[Fill, ...] = ("columns", "bands")
 THICKNESS = 0.1

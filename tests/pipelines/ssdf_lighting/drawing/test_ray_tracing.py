@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import square
-from pipelines.ssdf_lighting.drawing.ray_traced import Traced, ray_traced
+from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.light.microfacets import gloss
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
