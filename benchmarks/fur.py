@@ -24,7 +24,7 @@ from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
-from pipelines.photo_fur.drawing import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
 from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
