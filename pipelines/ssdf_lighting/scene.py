@@ -108,6 +108,12 @@ def built_in_scene(name: str, segments: int, floor: int) -> Scene:
 
     ``segments`` of a patch's edge (in the teapot of 20: 12 918 vertices), and ``floor`` squares
     along the floor's side (64: 4225 vertices). Raises ValueError for another name.
+
+    >>> scene = built_in_scene("court", segments=4, floor=8)
+    >>> scene.triangles.shape[1], scene.materials.albedo.shape
+    (3, (3, 3))
+    >>> float(round(np.linalg.norm(scene.vertices, axis=1).max(), 6))
+    1.0
     """
     if name == "teapot":
         pot = shapes.teapot(segments)

@@ -16,8 +16,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.ssdf_lighting.compression.compact import Codes, CompactCodes
+from pipelines.ssdf_lighting.compression.compact import Codes, CompactCodes, quantise_to_rmse
 from pipelines.ssdf_lighting.compression.entropy_coding import decode, encode
+from pipelines.ssdf_lighting.compression.shared_basis import shared_basis
+from pipelines.ssdf_lighting.compression.triangle_clusters import clusters_by_distance
 from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 
 MAGIC = b"TSUYASDF"
@@ -25,8 +27,30 @@ _VERSION = 1
 _HEADER = struct.Struct("<8sHHdIIIII")
 _MOST_LEVEL = 80
 _LARGEST_LEVEL = 4000  # 2^(4000 / 4) is finite
+_SHARED_ERROR = 0.5
+"""Part of the error that the shared basis alone may make."""
 _MOST_A_BYTE = 12_000
 """Numbers that a byte can hold: the surest answer costs -log2(65504 / 65536) bits."""
+
+
+def compress(
+    matrix: NDArray[np.float32],
+    triangles: NDArray[np.integer],
+    *,
+    clusters: int = 256,
+    rmse: float = 0.006,
+    seed: int = 0,
+) -> bytes:
+    """The file of an SSDF matrix (V, D), whole in memory; triangles (F, 3).
+
+    clusters: of triangles that are alike in their SSDFs. rmse: error in memory, radians weighted by
+    solid angle. Raises ValueError for more clusters than triangles.
+    """
+    basis = shared_basis(lambda: [matrix], matrix.shape, _SHARED_ERROR * rmse)
+    found = clusters_by_distance(basis.coordinates, triangles, clusters, seed)
+    # Without gaps: a cluster of triangles may have no vertex.
+    _, dense = np.unique(found.vertex, return_inverse=True)
+    return to_bytes(quantise_to_rmse(basis, dense.astype(np.int32), rmse))
 
 
 def to_bytes(compact: CompactCodes) -> bytes:

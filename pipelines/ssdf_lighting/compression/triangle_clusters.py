@@ -30,7 +30,10 @@ class Clusters(NamedTuple):
 def clusters_by_position(
     vertices: NDArray[np.float64], triangles: NDArray[np.integer], count: int, seed: int
 ) -> Clusters:
-    """The paper's: k-means on centroids, seeded by the farthest."""
+    """The paper's: k-means on centroids, seeded by the farthest.
+
+    vertices (V, 3); triangles (F, 3). Raises ValueError for more clusters than triangles.
+    """
     centroids = vertices[triangles].mean(axis=1)
     labels = k_means_from_farthest(centroids, count, seed)
     return Clusters(labels, _nearest(vertices, _means(centroids, labels)))
@@ -40,7 +43,7 @@ def clusters_by_distance(
     coordinates: NDArray[np.float32], triangles: NDArray[np.integer], count: int, seed: int
 ) -> Clusters:
     """k-means++ on SSDFs, given by ``coordinates`` (V, R) in the shared basis, strongest first; a
-    triangle has the mean of its corners'."""
+    triangle has the mean of its corners'. Raises ValueError for more clusters than triangles."""
     leading = leading_coordinates(coordinates)
     points = leading[triangles].mean(axis=1)
     labels = k_means_plus_plus(points, count, seed)

@@ -79,7 +79,11 @@ def _sign(values: FloatArray) -> FloatArray:
 
 @functools.lru_cache(maxsize=8)
 def texel_directions(n: int) -> FloatArray:
-    """Unit vectors (n * n, 3) to the texels' centres, read-only."""
+    """Unit vectors (n * n, 3) to the texels' centres, read-only.
+
+    >>> texel_directions(32).shape
+    (1024, 3)
+    """
     places = (np.arange(n) + 0.5) * (2.0 / n) - 1.0
     rows, columns = np.meshgrid(places, places, indexing="ij")
     made = directions_of(np.stack([columns, rows], axis=-1)).reshape(-1, 3)
@@ -145,6 +149,10 @@ def bilinear_taps(directions: ArrayLike, n: int) -> BilinearTaps:
     """The four texels around directions (..., 3), and their weights.
 
     Beyond the square's border lies the same border, mirrored about its middle.
+
+    >>> found = bilinear_taps([0.0, 0.0, 1.0], 4)
+    >>> found.texels.tolist(), found.weights.tolist()
+    ([5, 6, 9, 10], [0.25, 0.25, 0.25, 0.25])
     """
     place = (square_of(directions) + 1.0) * (n / 2.0) - 0.5
     first = np.floor(place).astype(np.int64)

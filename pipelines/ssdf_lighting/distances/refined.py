@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.geometry.rays import occluded
+from pipelines.geometry.rays import build_scene, occluded
 from pipelines.ssdf_lighting.distances.octahedral import (
     delaunay_sides,
     directions_of,
@@ -25,7 +25,7 @@ from pipelines.ssdf_lighting.distances.octahedral import (
     texel_directions,
 )
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_arcs
-from pipelines.ssdf_lighting.distances.visibility import RayOrigins
+from pipelines.ssdf_lighting.distances.visibility import RayOrigins, scene_visibility, unpacked
 from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, visible_edge
 
 if TYPE_CHECKING:
@@ -51,6 +51,21 @@ def refined_distances(
     edge = visible_edge(scene, origins.points, visible)
     point, way = _holes(scene, origins, normals, visible)
     return distances_to_arcs(visible, _with_loops(edge, point, way, visible.shape[1]))
+
+
+def scene_distances(
+    vertices: NDArray[np.float64],
+    triangles: NDArray[np.integer],
+    normals: NDArray[np.float64],
+    n: int,
+) -> NDArray[np.float32]:
+    """d (V, n²) float32, radians, of all vertices (V, 3) in n x n directions: the SSDF matrix.
+
+    normals (V, 3) unit; triangles (F, 3). All of it lies in memory; the graph goes by blocks.
+    """
+    seen = scene_visibility(vertices, triangles, normals, n)
+    visible = unpacked(seen.visible, n * n)
+    return refined_distances(build_scene(vertices, triangles), seen.origins, normals, visible)
 
 
 @functools.lru_cache(maxsize=4)

@@ -126,14 +126,7 @@ def scene_visibility(
     n: int,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> SceneVisibility:
-    """Cast rays from vertices (V, 3) in n x n directions, block by block; normals (V, 3) unit.
-
-    >>> from pipelines.geometry.shapes import sphere
-    >>> ball = sphere(8)
-    >>> found = scene_visibility(ball.vertices, ball.triangles, ball.normals, 16)
-    >>> found.visible.shape[1], found.sealed
-    (32, 0)
-    """
+    """Cast rays from vertices (V, 3) in n x n directions, block by block; normals (V, 3) unit."""
     scene = build_scene(vertices, triangles)
     origins = ray_origins(scene, vertices, triangles, normals)
     directions = texel_directions(n)

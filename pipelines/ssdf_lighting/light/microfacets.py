@@ -74,6 +74,9 @@ def fresnel(cosine: ArrayLike, specular: ArrayLike) -> FloatArray:
     """Unpolarised reflectance of a dielectric whose reflectance along the normal is F0 < 1.
 
     Exact: Schlick's polynomial is a fifth too dark at 60 degrees for F0 = 0.04.
+
+    >>> fresnel([1.0, 0.5], 0.04).round(4).tolist()
+    [0.04, 0.0892]
     """
     root = np.sqrt(np.asarray(specular, np.float64))
     index = (1 + root) / (1 - root)

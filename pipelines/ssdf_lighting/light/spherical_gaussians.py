@@ -44,7 +44,12 @@ class Lights(NamedTuple):
 
 
 def evaluate(lights: Lights, directions: ArrayLike) -> FloatArray:
-    """Radiance (..., 3) float64 from unit vectors (..., 3). Raises ValueError for other shapes."""
+    """Radiance (..., 3) float64 from unit vectors (..., 3). Raises ValueError for other shapes.
+
+    >>> lamp = Lights(np.array([[0.0, 0.0, 1.0]]), np.array([20.0]), np.array([[3.0, 2.0, 1.0]]))
+    >>> evaluate(lamp, [0.0, 0.0, 1.0]).tolist()
+    [3.0, 2.0, 1.0]
+    """
     ways = np.asarray(directions, dtype=np.float64)
     if ways.ndim == 0 or ways.shape[-1] != 3:
         raise ValueError(f"directions: found shape {ways.shape}, expected (..., 3).")
@@ -111,6 +116,10 @@ def visible_integral(distance: ArrayLike, sharpness: ArrayLike) -> FloatArray:
     for d > pi/2 it is the cap about p, for d < -pi/2 what the cap of -d leaves. Exact to 12 digits
     of the whole integral. Raises ValueError for a sharpness that is negative or not finite and for
     a distance that is NaN.
+
+    >>> shares = visible_integral([-0.2, 0.0, 0.2], 100.0) / integral(100.0)
+    >>> shares.round(3).tolist()
+    [0.023, 0.5, 0.977]
     """
     angles, sharp = _pairs(distance, sharpness)
     away = np.minimum(np.abs(angles), math.pi)
