@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from pipelines.street_billboards.capture.drive_points import DrivePoints, LoadedByFrame
     from pipelines.street_billboards.capture.point_fusion import FrameViews
     from pipelines.street_billboards.textures.view_textures import Photographs
+    from pipelines.virtual.city.drive import SimulatedDrive
     from pipelines.virtual.city.drive_photographs import DrivePhotographs
-    from pipelines.virtual.city.simulated_drive import SimulatedDrive
 
 _PIXELS = ("y", "x", "channel")
 

@@ -164,14 +164,14 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
 def _simulated(settings: DriveSettings, progress: Progress) -> Result:
     """The built-in drive through the city."""
     from pipelines.street_billboards.capture.held_out import held_out
-    from pipelines.virtual.city import simulated_drive
-    from pipelines.virtual.city.city import city
+    from pipelines.virtual.city.city import make_city
+    from pipelines.virtual.city.drive import plan_drive
     from pipelines.virtual.city.drive_photographs import photograph_drive
     from pipelines.virtual.city.photographing import CityStage
     from storage.readers.street_photographs import street_photographs
 
     size = settings.width, settings.width * 5 // 8
-    drive = simulated_drive.plan_drive(
+    drive = plan_drive(
         settings.frames,
         settings.spacing,
         *size,
@@ -181,7 +181,7 @@ def _simulated(settings: DriveSettings, progress: Progress) -> Result:
         exposure_spread=settings.exposure_spread,
     )
     metres, kept = settings.frames * settings.spacing, held_out(settings.frames)
-    streets = city(metres, settings.seed)
+    streets = make_city(metres, settings.seed)
     progress(0.1)
     with CityStage(streets, street_photographs(), *size) as stage:
         taken = photograph_drive(

@@ -20,7 +20,8 @@ from pipelines.street_billboards.capture import exposure, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, frames, processor_street, quads
 from pipelines.street_billboards.textures import atlases, eigen_textures, view_textures
 from pipelines.street_billboards.textures.forms import SEEN
-from pipelines.virtual.city import simulated_drive
+from pipelines.virtual.city import drive as city_drive
+from pipelines.virtual.city import drive_photographs
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 KEYS = {"drive": "city"}
@@ -316,9 +317,9 @@ def _paler(right: Callable[..., Any], *arguments: Any) -> Any:
 
 
 REGRESSIONS = (
-    Regression("exposure_spread", simulated_drive, "photograph", _bright_camera, KEYS),
-    Regression("detail", simulated_drive, "photograph", _blurred, KEYS),
-    Regression("frame_spacing", simulated_drive, "plan_drive", _slower, KEYS),
+    Regression("exposure_spread", drive_photographs, "expose_photograph", _bright_camera, KEYS),
+    Regression("detail", drive_photographs, "expose_photograph", _blurred, KEYS),
+    Regression("frame_spacing", city_drive, "plan_drive", _slower, KEYS),
     Regression("stereo_bad05", stereo, "refined", _off_by_a_pixel, KEYS),
     Regression("depth_error", stereo, "depth_maps", _deeper, KEYS),
     Regression("known_share", stereo, "depth_maps", _half_unknown, KEYS),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from pipelines.virtual.city.parts import Look, Part, box, grid, joined, panel, tube
+from pipelines.virtual.city.parts import Look, Part, box, grid_surface, join_parts, panel, tube
 
 Generator = np.random.Generator
 
@@ -48,7 +48,10 @@ def car(generator: Generator) -> Part:
     # Columns must run to the right as seen from outside: rows along x, columns down the left side.
     points, glass = points[:, ::-1], glass[:, ::-1]
     uvs = points[..., [0, 2]] / 2.5
-    parts = [grid(points, uvs, paint, kept=~glass), grid(points, uvs, _GLASS, kept=glass)]
+    parts = [
+        grid_surface(points, uvs, paint, kept=~glass),
+        grid_surface(points, uvs, _GLASS, kept=glass),
+    ]
     parts += [_end(points[0], -1.0, paint), _end(points[-1], 1.0, paint)]
     parts += [_wheel(x, side) for x in (-1.3, 1.35) for side in (-1.0, 1.0)]
     red, white = Look("paint", (0.45, 0.02, 0.02), gloss=1.0), Look("paint", (0.8, 0.8, 0.78), 1.0)
@@ -61,7 +64,7 @@ def car(generator: Generator) -> Part:
     parts.append(box((2.1, -0.65, 0.3), (2.18, 0.65, 0.45), black))
     for y in (-0.98, 0.86):
         parts.append(box((0.55, y, 0.92), (0.68, y + 0.12, 1.05), paint))
-    return joined(parts)
+    return join_parts(parts)
 
 
 _BELT = 4
@@ -98,7 +101,7 @@ def _end(outline: np.ndarray, towards: float, look: Look) -> Part:
     middle = np.broadcast_to(outline.mean(axis=0), closed.shape)
     rows = np.stack([middle, closed] if towards < 0 else [closed, middle])
     normals = np.broadcast_to(np.array([towards, 0.0, 0.0]), rows.shape)
-    return grid(rows, rows[..., 1:] / 2.5, look, normals=normals)
+    return grid_surface(rows, rows[..., 1:] / 2.5, look, normals=normals)
 
 
 def _wheel(x: float, side: float) -> Part:
@@ -117,6 +120,8 @@ def _wheel(x: float, side: float) -> Part:
         ).copy()
         disc[..., 2] = 0.31 + radii * np.sin(angle)
         parts.append(
-            grid(disc, disc[..., [0, 2]] * 1.5, look, normals=np.broadcast_to(normal, disc.shape))
+            grid_surface(
+                disc, disc[..., [0, 2]] * 1.5, look, normals=np.broadcast_to(normal, disc.shape)
+            )
         )
-    return joined(parts)
+    return join_parts(parts)

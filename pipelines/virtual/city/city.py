@@ -21,12 +21,12 @@ from pipelines.virtual.city.parts import (
     Look,
     Part,
     box,
-    joined,
+    join_parts,
     panel,
-    placed,
+    place_part,
 )
 
-__all__ = ["BEFORE", "BEYOND", "MATERIALS", "City", "city"]
+__all__ = ["BEFORE", "BEYOND", "MATERIALS", "City", "make_city"]
 
 BEFORE, BEYOND = 10.0, 40.0
 """Metres of street before the first camera and beyond the last."""
@@ -60,7 +60,7 @@ class City(NamedTuple):
     """(t,), thin poles."""
 
 
-def city(length: float, seed: int = 0) -> City:
+def make_city(length: float, seed: int = 0) -> City:
     """A street for a drive from x = 0 to ``length`` metres.
 
     It reaches from x = -10 to length + 40 and is closed there. The same seed gives the same city.
@@ -74,7 +74,7 @@ def city(length: float, seed: int = 0) -> City:
         parts += _row_of_houses(side, start, end, seed)
         parts += _furniture(side, start, end, seed)
     parts += _closed(start, end, seed)
-    whole = joined(parts)
+    whole = join_parts(parts)
     visibility = sky_visibility(whole.vertices, whole.normals, whole.triangles)
     return City(**whole._asdict(), sky_visibility=visibility)
 
@@ -110,8 +110,8 @@ def _ground(start: float, end: float, seed: int) -> Part:
         y = generator.uniform(-2.6, 1.0)
         along, across = (generator.uniform(2.0, 6.0), 0, 0), (0, generator.uniform(0.8, 1.6), 0)
         parts.append(panel((x, y, 0.015), along, across, patch, shift=(x, y)))
-        parts.append(placed(cover(generator), (x + 7.0, generator.uniform(-2.0, 2.0), 0.0)))
-    return joined(parts)
+        parts.append(place_part(cover(generator), (x + 7.0, generator.uniform(-2.0, 2.0), 0.0)))
+    return join_parts(parts)
 
 
 def _row_of_houses(side: int, start: float, end: float, seed: int) -> list[Part]:
@@ -133,8 +133,8 @@ def _row_of_houses(side: int, start: float, end: float, seed: int) -> list[Part]
 def _along(side: int, front: Part, x: float, width: float, y: float) -> Part:
     """A front from x to x + width, on the left (side 0) or the right of the road."""
     if side == 0:
-        return placed(front, (x, y, _KERB))
-    return placed(front, (x + width, -y, _KERB), 180.0)
+        return place_part(front, (x, y, _KERB))
+    return place_part(front, (x + width, -y, _KERB), 180.0)
 
 
 def _furniture(side: int, start: float, end: float, seed: int) -> list[Part]:
@@ -150,7 +150,7 @@ def _furniture(side: int, start: float, end: float, seed: int) -> list[Part]:
                 normals=post.normals * _MIRRORED,
                 triangles=post.triangles[:, ::-1],
             )
-        parts.append(placed(post, (x, sign * _POLE, _KERB)))
+        parts.append(place_part(post, (x, sign * _POLE, _KERB)))
         middle = start + (number + 0.75) * _BAY
         if generator.random() < 0.7:
             towards = 180.0 if side == 0 else 0.0
@@ -160,10 +160,10 @@ def _furniture(side: int, start: float, end: float, seed: int) -> list[Part]:
             roll = float(np.degrees(np.arctan(_KERB / 1.5)))
             roll = -roll if (side == 0) == (towards == 180.0) else roll
             at = (middle + generator.uniform(-0.7, 0.7), sign * _PARKED, _KERB / 2)
-            parts.append(placed(car(generator), at, towards, roll))
+            parts.append(place_part(car(generator), at, towards, roll))
         if generator.random() < 0.4:
             at = (middle + generator.uniform(-2.0, 2.0), sign * 5.35, _KERB)
-            parts.append(placed(tree(generator), at, turn))
+            parts.append(place_part(tree(generator), at, turn))
     return parts
 
 
@@ -174,5 +174,5 @@ def _closed(start: float, end: float, seed: int) -> list[Part]:
         generator = np.random.default_rng([seed, _HOUSES, 2, number])
         front = house(17.0, generator)
         y = 8.5 if degrees < 0 else -8.5
-        parts.append(placed(front, (x, y, 0.0), degrees))
+        parts.append(place_part(front, (x, y, 0.0), degrees))
     return parts

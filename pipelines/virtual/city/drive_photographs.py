@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.cameras import moved_left
-from pipelines.virtual.city import simulated_drive
+from pipelines.virtual.city.drive import SimulatedDrive, expose_photograph
 from pipelines.virtual.city.photographing import Shot
-from pipelines.virtual.city.simulated_drive import SimulatedDrive
 
 EXPOSURE = 0.95
 """From the simulated city's radiance to pictures."""
@@ -60,7 +59,7 @@ def photograph_drive(
     """Take all pictures of a drive, and the truth of the frames held out (f,).
 
     offsets: metres to the left of the path, of the pictures beside it; noise: as for
-    ``simulated_drive.photograph``, of white; progress is told the fraction done. Raises ValueError
+    `drive.expose_photograph`, of white; progress is told the fraction done. Raises ValueError
     where the cameras are none of the stage's (``CityStage.shoot``).
     """
     frames, cameras = drive.poses.shape[:2]
@@ -73,7 +72,7 @@ def photograph_drive(
             labels = bool(held_out[frame]) and camera == middle
             pose, lens = drive.poses[frame, camera], drive.intrinsics[camera]
             shot = stage.shoot(lens, pose, labels=labels)
-            photographs[frame, camera] = simulated_drive.photograph(
+            photographs[frame, camera] = expose_photograph(
                 shot.radiance, drive.gains[frame, camera], EXPOSURE, noise, random
             )
             if labels:

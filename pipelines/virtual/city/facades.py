@@ -15,11 +15,11 @@ from pipelines.virtual.city.parts import (
     Look,
     Part,
     box,
-    copies,
-    grid,
-    joined,
+    copy_part,
+    grid_surface,
+    join_parts,
     panel,
-    placed,
+    place_part,
     tube,
     wall_with_holes,
 )
@@ -102,7 +102,7 @@ def house(width: float, generator: Generator) -> Part:
         at = width - 0.25
         pipe = Look("metal", (0.25, 0.25, 0.26))
         parts.append(tube((at, -0.14, 0), (at, -0.14, height - 0.3), 0.05, pipe, rings=12, sides=8))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _lighter(colour: Colour) -> Colour:
@@ -129,7 +129,7 @@ def _body(width: float, height: float, wall: Look, generator: Generator) -> Part
             points[1, :, 1], points[1, :, 2] = deep / 2, height + rise
             uvs = points[..., 1:] / 1.2
             normals = np.broadcast_to(np.array([along, 0.0, 0.0]), points.shape)
-            parts.append(grid(points, uvs, sides, normals=normals))
+            parts.append(grid_surface(points, uvs, sides, normals=normals))
         if generator.random() < 0.7:
             x, brick = generator.uniform(1, width - 1.5), Look("brick", (0.28, 0.2, 0.17))
             parts.append(box((x, 2.2, height), (x + 0.7, 2.8, height + rise + 0.8), brick))
@@ -138,7 +138,7 @@ def _body(width: float, height: float, wall: Look, generator: Generator) -> Part
         parts.append(panel((0, 0, height), (width, 0, 0), (0, deep, 0), flat, longest=4.0))
         parapet = box((0, -0.05, height), (width, 0.25, height + 0.5), wall, faces="-x+x-y+y+z")
         parts.append(parapet)
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _upper_floors(front: _Front, generator: Generator) -> Part:
@@ -159,13 +159,13 @@ def _upper_floors(front: _Front, generator: Generator) -> Part:
     for lit, chosen in ((0.4, places[looks]), (1.0, places[~looks])):
         if len(chosen):
             unit = window(opening, tall, front.trim, front.frame, style=style, lit=lit)
-            parts.append(copies(unit, chosen))
+            parts.append(copy_part(unit, chosen))
     if generator.random() < 0.3 and opening > 1.1:
         rail = _balcony(opening + 0.5, front.trim)
         last = front.windows * (front.floors - 1) + 1
         at = places[: last : max(2, front.windows)] - [0.25, 0, 0.55]
-        parts.append(copies(rail, at))
-    return joined(parts)
+        parts.append(copy_part(rail, at))
+    return join_parts(parts)
 
 
 def window(
@@ -198,7 +198,7 @@ def window(
         box((a, front, c), (b, depth, d), frame, faces="-x+x-y-z+z", longest=9.0)
         for a, b, c, d in bars
     ]
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _balcony(width: float, trim: Look) -> Part:
@@ -211,7 +211,7 @@ def _balcony(width: float, trim: Look) -> Part:
     parts.append(box((0, -0.9, 0.95), (width, -0.85, 1.0), iron))
     for x in (0.0, width - 0.05):
         parts.append(box((x, -0.85, 0.95), (x + 0.05, 0, 1.0), iron))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _dwelling(front: _Front, generator: Generator) -> Part:
@@ -230,12 +230,12 @@ def _dwelling(front: _Front, generator: Generator) -> Part:
     parts = [wall_with_holes(xs, zs, holes, front.wall)]
     if len(places):
         glazed = window(opening, head - sill, front.trim, front.frame, style=2)
-        parts.append(copies(glazed, places))
-    parts.append(placed(_door(opening, head, front.trim, generator), (left[door], 0, 0)))
+        parts.append(copy_part(glazed, places))
+    parts.append(place_part(_door(opening, head, front.trim, generator), (left[door], 0, 0)))
     stone = Look("paving", (0.3, 0.29, 0.27))
     for a, b in ((0.0, left[door]), (left[door] + opening, front.width)):
         parts.append(box((a, -0.05, 0), (b, 0, 0.5), stone, faces="-x+x-y+z"))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _door(width: float, height: float, trim: Look, generator: Generator) -> Part:
@@ -255,7 +255,7 @@ def _door(width: float, height: float, trim: Look, generator: Generator) -> Part
         parts.append(box(*raised, leaf, faces="-x+x-y-z+z"))
     handle = Look("metal", (0.5, 0.42, 0.2))
     parts.append(box((width - 0.14, depth - 0.08, 0.95), (width - 0.09, depth, 1.1), handle))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _shop(width: float, ground: float, trim: Look, generator: Generator) -> Part:
@@ -290,7 +290,7 @@ def _shop(width: float, ground: float, trim: Look, generator: Generator) -> Part
             for x in (0.25 * wide, 0.75 * wide):
                 hole.append(box((x, depth - 0.05, 0), (x + 0.07, depth, head), frame))
             hole.append(box((0, depth - 0.05, 2.1), (wide, depth, 2.18), frame))
-        parts.append(placed(joined(hole), (left, 0, 0)))
+        parts.append(place_part(join_parts(hole), (left, 0, 0)))
     sign = Look("wood", _one_of(generator, _STRONG))
     parts.append(box((0.2, -0.12, head + 0.1), (width - 0.2, 0, ground - 0.2), sign))
     picture = Look(POSTERS[generator.integers(len(POSTERS))])
@@ -305,7 +305,7 @@ def _shop(width: float, ground: float, trim: Look, generator: Generator) -> Part
     )
     if generator.random() < 0.5:
         parts.append(_awning(lefts[0], rights[-1], head + 0.05, generator))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def _awning(left: float, right: float, top: float, generator: Generator) -> Part:
@@ -324,7 +324,7 @@ def _awning(left: float, right: float, top: float, generator: Generator) -> Part
         edge = (x, -1.1, top - 0.75)
         parts.append(panel(edge, (wide, 0, 0), fringe, look))
         parts.append(panel((x + wide, -1.1, top - 0.75), (-wide, 0, 0), fringe, look))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def gap_wall(width: float, generator: Generator) -> Part:
@@ -344,4 +344,4 @@ def gap_wall(width: float, generator: Generator) -> Part:
         edge = Look("metal", (0.1, 0.1, 0.1))
         left, right = corner[0] - 0.05, corner[0] + wide + 0.05
         parts.append(box((left, -0.025, 0.65), (right, 0, 1.95), edge, faces="-x+x-y-z+z"))
-    return joined(parts)
+    return join_parts(parts)

@@ -8,11 +8,11 @@ from pipelines.virtual.city.parts import (
     POSTERS,
     Look,
     Part,
-    as_pole,
     blob,
     box,
-    grid,
-    joined,
+    grid_surface,
+    join_parts,
+    mark_as_pole,
     panel,
     tube,
 )
@@ -40,14 +40,14 @@ def _post(radius: float, height: float, look: Look) -> Part:
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(13, height)], axis=-1)
     cap = np.stack([rim, np.broadcast_to([0.0, 0.0, height], rim.shape)])
     up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), cap.shape)
-    return as_pole(joined([shaft, grid(cap, cap[..., :2], look, normals=up)]))
+    return mark_as_pole(join_parts([shaft, grid_surface(cap, cap[..., :2], look, normals=up)]))
 
 
 def _lamp(radius: float, height: float, look: Look) -> Part:
     arm_end = (0.0, -1.3, height + 0.15)
     head = Look("paint", (0.16, 0.16, 0.17))
     glow = Look("paint", (0.8, 0.78, 0.7))
-    return joined(
+    return join_parts(
         [
             _post(radius, height, look),
             box((-0.14, -0.14, 0), (0.14, 0.14, 0.35), look),
@@ -69,7 +69,7 @@ def _sign_post(radius: float, height: float, look: Look, generator: Generator) -
     rim = Look("paint", colour)
     inner = 0.8 * side
     corner_front = (-near - 0.045, inner / 2, bottom + 0.1 * side)
-    return joined(
+    return join_parts(
         [
             _post(radius, height, look),
             box((-near - 0.025, -half, bottom), (-near, half, bottom + side), rim),
@@ -97,7 +97,7 @@ def tree(generator: Generator) -> Part:
         parts.append(blob(centre, generator.uniform(0.4, 0.75), look, generator, segments=14))
     pit = Look("leaves", (0.10, 0.08, 0.06))
     parts.append(panel((-0.6, -0.6, 0.015), (1.2, 0, 0), (0, 1.2, 0), pit))
-    return joined(parts)
+    return join_parts(parts)
 
 
 def cover(generator: Generator) -> Part:
@@ -111,4 +111,4 @@ def cover(generator: Generator) -> Part:
     up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), disc.shape)
     # The coin at the photograph's upper right (384 x 303 pixels): its middle, its size.
     uvs = np.array([0.871, 0.856]) + disc[..., :2] * [0.215, 0.275]
-    return grid(disc, uvs, look, normals=up)
+    return grid_surface(disc, uvs, look, normals=up)

@@ -34,9 +34,9 @@ def city_textures(
     if missing := sorted(needed - set(photographs)):
         raise ValueError(f"photographs: missing {', '.join(missing)}.")
     light = {name: decode_srgb(photographs[name] / 255.0).astype(np.float32) for name in needed}
-    gravel = repeatable(evened(light["gravel"]))
-    grass = repeatable(evened(light["grass"]))
-    moon = repeatable(evened(light["moon"][:400]))
+    gravel = make_tileable(even_brightness(light["gravel"]))
+    grass = make_tileable(even_brightness(light["grass"]))
+    moon = make_tileable(even_brightness(light["moon"][:400]))
     bricks = _bricks(light["brick"])
     linear = {
         "brick": bricks,
@@ -44,7 +44,7 @@ def city_textures(
         "asphalt": _contrast(gravel, 0.8),
         "paving": _contrast(bricks.mean(axis=2, keepdims=True), 0.8) * _contrast(gravel, 0.35),
         "leaves": grass**1.5,
-        "wood": _contrast(repeatable(evened(light["coffee"][290:, :130], 20.0)), 0.6),
+        "wood": _contrast(make_tileable(even_brightness(light["coffee"][290:, :130], 20.0)), 0.6),
         "metal": _contrast(gravel, 0.3),
         "roof": _contrast(bricks.mean(axis=2, keepdims=True), 1.2) * _contrast(grass, 0.3),
         "paint": _contrast(moon, 0.15),
@@ -59,7 +59,7 @@ def city_textures(
     return textures
 
 
-def evened(image: Image, sigma: float = 60.0) -> Image:
+def even_brightness(image: Image, sigma: float = 60.0) -> Image:
     """A photograph of a material (y, x, 3) without slow changes of brightness, of mean 1."""
     grey = image.mean(axis=2)
     slow = cv2.GaussianBlur(grey, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
@@ -67,7 +67,7 @@ def evened(image: Image, sigma: float = 60.0) -> Image:
     return level / level.mean()
 
 
-def repeatable(image: Image, overlap: float = 0.15) -> Image:
+def make_tileable(image: Image, overlap: float = 0.15) -> Image:
     """A picture (y, x, c) whose ends fit together: faded over by ``overlap`` of each side.
 
     Fading keeps the variance: the weights' squares sum to 1.
@@ -102,7 +102,7 @@ def _bricks(photograph: Image) -> Image:
         (_SIDE, _SIDE),
         flags=cv2.INTER_AREA,
     )
-    level = evened(straight.astype(np.float32), 90.0)
+    level = even_brightness(straight.astype(np.float32), 90.0)
     grey = level.mean(axis=2, keepdims=True)
     dark, bright = np.quantile(grey, [0.3, 0.93])
     mortar = np.clip((grey - dark) / (bright - dark), 0.0, 1.0)

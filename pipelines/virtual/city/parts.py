@@ -72,7 +72,7 @@ class Part(NamedTuple):
 # ---- joining and moving ------------------------------------------------------------------------
 
 
-def joined(parts: Iterable[Part]) -> Part:
+def join_parts(parts: Iterable[Part]) -> Part:
     """All parts as one; at least one."""
     every = list(parts)
     starts = np.cumsum([0, *(len(part.vertices) for part in every)])[:-1]
@@ -85,7 +85,7 @@ def joined(parts: Iterable[Part]) -> Part:
     return Part(**fields, triangles=triangles.astype(np.int32))
 
 
-def copies(part: Part, offsets: ArrayLike) -> Part:
+def copy_part(part: Part, offsets: ArrayLike) -> Part:
     """A part at each offset (n, 3), n >= 1."""
     places = np.asarray(offsets, np.float32).reshape(-1, 3)
     n = len(places)
@@ -102,7 +102,7 @@ def copies(part: Part, offsets: ArrayLike) -> Part:
     )
 
 
-def placed(part: Part, offset: ArrayLike, degrees: float = 0.0, roll: float = 0.0) -> Part:
+def place_part(part: Part, offset: ArrayLike, degrees: float = 0.0, roll: float = 0.0) -> Part:
     """A part rolled about x by ``roll``, turned about z by ``degrees``, then moved."""
     a, b = math.radians(degrees), math.radians(roll)
     about_z = np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
@@ -114,7 +114,7 @@ def placed(part: Part, offset: ArrayLike, degrees: float = 0.0, roll: float = 0.
     )
 
 
-def as_pole(part: Part) -> Part:
+def mark_as_pole(part: Part) -> Part:
     """The part, marked as a thin pole."""
     return part._replace(pole=np.ones(len(part.triangles), np.bool_))
 
@@ -122,7 +122,7 @@ def as_pole(part: Part) -> Part:
 # ---- surfaces ----------------------------------------------------------------------------------
 
 
-def grid(
+def grid_surface(
     points: FloatArray,
     uvs: FloatArray,
     look: Look,
@@ -158,7 +158,9 @@ def grid(
     )
 
 
-def refined(lines: Sequence[float] | FloatArray, longest: float = _LONGEST_EDGE) -> FloatArray:
+def subdivide_lines(
+    lines: Sequence[float] | FloatArray, longest: float = _LONGEST_EDGE
+) -> FloatArray:
     """Rising positions with others put between them, so that no step is longer than ``longest``."""
     steps = [
         np.linspace(a, b, max(1, math.ceil((b - a) / longest - 1e-6)), endpoint=False)
@@ -183,15 +185,15 @@ def panel(
     """
     first, right, rise = (np.asarray(v, np.float64) for v in (corner, along, up))
     width, height = float(np.linalg.norm(right)), float(np.linalg.norm(rise))
-    s = refined([0.0, width], longest) / width
-    t = refined([0.0, height], longest) / height
+    s = subdivide_lines([0.0, width], longest) / width
+    t = subdivide_lines([0.0, height], longest) / height
     points = first + s[None, :, None] * right + t[:, None, None] * rise
     size = (width, height) if fitted else TEXTURE_SIZES[look.material]
     across, upwards = np.meshgrid(s * width + shift[0], t * height + shift[1])
     uvs = np.stack([across / size[0], upwards / size[1]], axis=-1)
     normal = np.cross(right, rise)
     normal /= np.linalg.norm(normal)
-    return grid(points, uvs, look, normals=np.broadcast_to(normal, points.shape))
+    return grid_surface(points, uvs, look, normals=np.broadcast_to(normal, points.shape))
 
 
 def wall_with_holes(
@@ -204,7 +206,7 @@ def wall_with_holes(
 
     columns (c + 1,), rows (r + 1,): lines in metres; holes (r, c). One grid: no cracks.
     """
-    xs, zs = refined(columns), refined(rows)
+    xs, zs = subdivide_lines(columns), subdivide_lines(rows)
     middle_x, middle_z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
     open_ = holes[
         np.searchsorted(rows, middle_z)[:, None] - 1, np.searchsorted(columns, middle_x)[None] - 1
@@ -214,7 +216,7 @@ def wall_with_holes(
     size = TEXTURE_SIZES[look.material]
     uvs = np.stack([x / size[0], z / size[1]], axis=-1)
     normals = np.broadcast_to(np.array([0.0, -1.0, 0.0]), points.shape)
-    return grid(points, uvs, look, normals=normals, kept=~open_)
+    return grid_surface(points, uvs, look, normals=normals, kept=~open_)
 
 
 def box(
@@ -237,7 +239,7 @@ def box(
         "-z": (a + y, x, -y),
     }
     shift = (float(a[0]), float(a[2]))
-    return joined(
+    return join_parts(
         panel(*frames[faces[i : i + 2]], look, shift=shift, longest=longest)
         for i in range(0, len(faces), 2)
     )
@@ -259,7 +261,7 @@ def tube(
     points = a + t[:, None, None] * (b - a) + radius * around[None]
     size = TEXTURE_SIZES[look.material]
     across, upwards = np.meshgrid(angle * radius / size[0], t * np.linalg.norm(b - a) / size[1])
-    return grid(
+    return grid_surface(
         points,
         np.stack([across, upwards], axis=-1),
         look,
@@ -296,4 +298,4 @@ def blob(
     uvs = np.stack(
         np.broadcast_arrays(phi / (2 * np.pi) * turns, (np.pi - theta) * radius / size), axis=-1
     )
-    return grid(points, uvs + generator.uniform(0, 1, 2), look, normals=normals)
+    return grid_surface(points, uvs + generator.uniform(0, 1, 2), look, normals=normals)

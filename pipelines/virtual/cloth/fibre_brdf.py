@@ -26,7 +26,7 @@ the parameters (tested). F0 of a single dielectric surface is some 0.05; above t
 the light that passes a fibre and leaves it on the far side as if mirrored, too.
 
 Directions are in the local frame: x along the fibre, y across it, z the normal. The kernels here
-are compiled into the renderer's; ``reflectance`` is the same for arrays.
+are compiled into the renderer's; `fibre_brdf` is the same for arrays.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def grazing_fresnel(f0: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def microfacets(
+def microfacet_lobe(
     ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, along: float, across: float
 ) -> tuple[float, float]:
     """Evaluate D G / (4 cos_i cos_o), and Schlick's (1 - i.h)^5, for unit vectors above."""
@@ -68,7 +68,7 @@ def microfacets(
 
 
 @njit(cache=True, error_model="numpy")
-def half_fifth(cosine: float) -> float:
+def diffuse_falloff(cosine: float) -> float:
     """Evaluate (1 - c/2)^5 of Ashikhmin and Shirley's diffuse lobe."""
     base = 1.0 - 0.5 * cosine
     square = base * base
@@ -76,9 +76,9 @@ def half_fifth(cosine: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def transmitted(f0: float, fifth: float) -> float:
-    """T: what is left for the diffuse lobe; ``fifth`` is half_fifth of the cosine."""
-    return 1.0 - f0 - (grazing_fresnel(f0) - f0) * fifth
+def transmitted(f0: float, falloff: float) -> float:
+    """T: what is left for the diffuse lobe; ``falloff`` is `diffuse_falloff` of the cosine."""
+    return 1.0 - f0 - (grazing_fresnel(f0) - f0) * falloff
 
 
 @njit(cache=True, error_model="numpy")
@@ -101,19 +101,19 @@ def _reflectance(
         if iz <= 0.0 or oz <= 0.0:
             out[k] = 0.0
             continue
-        lobe, schlick = microfacets(
+        lobe, schlick = microfacet_lobe(
             light[k, 0], light[k, 1], iz, view[k, 0], view[k, 1], oz,
             roughness[k, 0], roughness[k, 1],
         )  # fmt: skip
         for c in range(3):
             f0 = specular[k, c]
             fresnel = f0 + (grazing_fresnel(f0) - f0) * schlick
-            through = transmitted(f0, half_fifth(iz)) * transmitted(f0, half_fifth(oz))
+            through = transmitted(f0, diffuse_falloff(iz)) * transmitted(f0, diffuse_falloff(oz))
             diffuse = albedo[k, c] / math.pi * through / mean_transmitted(f0)
             out[k, c] = fresnel * lobe + diffuse
 
 
-def reflectance(
+def fibre_brdf(
     light: ArrayLike,
     view: ArrayLike,
     *,

@@ -32,15 +32,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry.rays import build_scene, first_hits, occluded
 from pipelines.light.directions import unit_vectors
-from pipelines.virtual.cloth.interreflection import gather, vertex_irradiance
+from pipelines.virtual.cloth.interreflection import gather_interreflection, vertex_irradiance
 from pipelines.virtual.cloth.mesh import Cloth
 from pipelines.virtual.cloth.shading import (
     LIFT,
     FloatArray,
-    Spots,
-    count_lit,
-    find_spots,
-    list_rays,
+    ShadingPoints,
+    count_lights_above,
+    find_shading_points,
+    list_shadow_rays,
     shade,
 )
 
@@ -103,7 +103,7 @@ class Gonioreflectometer:
         view: (2,) theta, phi in radians. Raises ValueError for theta beyond 80 degrees.
         """
         towards = _vectors(np.asarray(view, np.float64).reshape(1, 2), "view")[0]
-        spots = self._seen(self._places, towards)
+        points = self._seen(self._places, towards)
         texels = self.size[0] * self.size[1]
         lights = len(self._lights)
         out = np.empty((lights, texels, 3), np.float32)
@@ -112,15 +112,15 @@ class Gonioreflectometer:
             end = min(begin + block, texels)
             part = slice(begin * self.samples, end * self.samples)
             first, blocked = self._shadows(
-                spots.position[part], spots.facing[part], spots.frame[part, 2]
+                points.position[part], points.facing[part], points.frame[part, 2]
             )
             shade(
-                spots, part.start, self.samples, self._lights, first, blocked, self._reflected,
+                points, part.start, self.samples, self._lights, first, blocked, self._reflected,
                 out[:, begin:end],
             )  # fmt: skip
         return out.reshape(lights, *self.size, 3)
 
-    def _seen(self, places: NDArray[np.float64], towards: NDArray[np.float64]) -> Spots:
+    def _seen(self, places: NDArray[np.float64], towards: NDArray[np.float64]) -> ShadingPoints:
         """What is met along ``towards`` behind places (N, 2) of the reference plane."""
         above = self._high + 1e-3
         start = places + towards[:2] * ((above - self.reference) / towards[2])
@@ -131,11 +131,11 @@ class Gonioreflectometer:
         hits = first_hits(self._scene, origins, direction)
         self.rays += len(origins)
         source = np.where(hits.triangle >= 0, self._source[hits.triangle], -1)
-        spots = Spots.empty(len(origins))
-        find_spots(
-            origins, direction, hits.distance, source, hits.barycentric, self._surface, spots
+        points = ShadingPoints.empty(len(origins))
+        find_shading_points(
+            origins, direction, hits.distance, source, hits.barycentric, self._surface, points
         )
-        return spots
+        return points
 
     def _mean_height(self) -> float:
         axis = (np.arange(_HEIGHT_PROBES) + 0.5) / _HEIGHT_PROBES
@@ -151,12 +151,12 @@ class Gonioreflectometer:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Rays to the lights above each place: each place's first row, and whether blocked."""
         count = np.empty(len(position), np.int64)
-        count_lit(facing, normal, self._lights, count)
+        count_lights_above(facing, normal, self._lights, count)
         ends = np.cumsum(count)
         origins = np.empty((int(ends[-1]), 3), np.float32)
         directions = np.empty_like(origins)
         first = ends - count
-        list_rays(position, facing, normal, self._lights, first, origins, directions)
+        list_shadow_rays(position, facing, normal, self._lights, first, origins, directions)
         self.rays += len(origins)
         return first, occluded(self._scene, origins, directions)
 
@@ -199,7 +199,9 @@ class Gonioreflectometer:
         reflected = none
         for _ in range(bounces):
             new = np.empty((count, len(self._lights), 3), np.float32)
-            gather(triangle, barycentric, surface.triangles, surface.albedo, direct, reflected, new)
+            gather_interreflection(
+                triangle, barycentric, surface.triangles, surface.albedo, direct, reflected, new
+            )
             reflected = new
         return reflected
 

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from pipelines.virtual.cloth.fibre_brdf import half_fifth, transmitted
-from pipelines.virtual.cloth.shading import FloatArray, faces
+from pipelines.virtual.cloth.fibre_brdf import diffuse_falloff, transmitted
+from pipelines.virtual.cloth.shading import FloatArray, light_is_above
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
@@ -29,17 +29,17 @@ def vertex_irradiance(
         f0 = (specular[v, 0] + specular[v, 1] + specular[v, 2]) / 3
         for k in range(len(lights)):
             out[v, k] = 0.0
-            if faces(normals[v], normals[v], lights[k]):
+            if light_is_above(normals[v], normals[v], lights[k]):
                 if not blocked[row]:
                     cosine = 0.0
                     for c in range(3):
                         cosine += normals[v, c] * lights[k, c]
-                    out[v, k] = cosine * transmitted(f0, half_fifth(cosine))
+                    out[v, k] = cosine * transmitted(f0, diffuse_falloff(cosine))
                 row += 1
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def gather(
+def gather_interreflection(
     triangle: NDArray[np.int32],
     barycentric: FloatArray,
     triangles: NDArray[np.int32],

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.virtual.cloth.yarns import FloatArray, Tubes, unit
+from pipelines.virtual.cloth.yarns import FloatArray, Tubes, normalize
 
 
 class Cloth(NamedTuple):
@@ -28,7 +28,7 @@ class Cloth(NamedTuple):
     roughness: NDArray[np.float32]
 
 
-def part(
+def cloth_of_tubes(
     tubes: Tubes, *, albedo: ArrayLike, specular: ArrayLike, roughness: tuple[float, float]
 ) -> Cloth:
     """Give tubes their reflectance; albedo and specular broadcast to (Y, R, A, 3)."""
@@ -49,7 +49,7 @@ def part(
     )
 
 
-def join(*parts: Cloth) -> Cloth:
+def join_cloths(*parts: Cloth) -> Cloth:
     """Put parts together."""
     first = np.cumsum([0] + [len(p.vertices) for p in parts[:-1]])
     triangles = [p.triangles + np.int32(f) for p, f in zip(parts, first, strict=True)]
@@ -58,7 +58,7 @@ def join(*parts: Cloth) -> Cloth:
     return Cloth(*joined)
 
 
-def sheet(
+def cloth_sheet(
     positions: FloatArray,
     *,
     fibres: ArrayLike,
@@ -90,8 +90,8 @@ def sheet(
     return Cloth(
         points[1:-1, 1:-1].reshape(-1, 3).astype(np.float32),
         triangles.astype(np.int32),
-        unit(normals).reshape(-1, 3).astype(np.float32),
-        flat(unit(np.asarray(fibres, np.float64))),
+        normalize(normals).reshape(-1, 3).astype(np.float32),
+        flat(normalize(np.asarray(fibres, np.float64))),
         flat(albedo),
         flat(specular),
         np.tile(np.array(roughness, np.float32), (side * side, 1)),

@@ -15,10 +15,10 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pipelines.virtual.cloth.fibre_brdf import (
+    diffuse_falloff,
     grazing_fresnel,
-    half_fifth,
     mean_transmitted,
-    microfacets,
+    microfacet_lobe,
     transmitted,
 )
 from pipelines.virtual.cloth.mesh import Cloth
@@ -28,7 +28,7 @@ LEAST_COSINE = 1e-3  # of a view: interpolated normals turn away at silhouettes
 LIFT = 2e-5  # of shadow rays off their surface, in sides of the tile
 
 
-class Spots(NamedTuple):
+class ShadingPoints(NamedTuple):
     """N places on the surface, seen from one direction.
 
     position: (N, 3), x and y in the tile [0, 1), lifted off the surface.
@@ -49,14 +49,14 @@ class Spots(NamedTuple):
     roughness: FloatArray
 
     @staticmethod
-    def empty(count: int) -> Spots:
+    def empty(count: int) -> ShadingPoints:
         """Room for ``count`` places."""
 
         def room(*shape: int) -> FloatArray:
             return np.empty((count, *shape), np.float32)
 
         corner = np.empty((count, 3), np.int32)
-        return Spots(
+        return ShadingPoints(
             room(3), room(3), room(3, 3), room(3), corner, room(3), room(3), room(3), room(2)
         )
 
@@ -106,24 +106,24 @@ def _across_fibre(
 
 
 @njit(cache=True, error_model="numpy")
-def _find_spot(
+def _find_point(
     origin: FloatArray,
     direction: FloatArray,
     distance: float,
     triangle: int,
     barycentric: FloatArray,
     surface: Cloth,
-    spots: Spots,
+    points: ShadingPoints,
     i: int,
 ) -> None:
     if triangle < 0:
-        spots.corner[i] = -1
-        spots.position[i] = 0.0
-        spots.facing[i] = 0.0
-        spots.frame[i] = 0.0
+        points.corner[i] = -1
+        points.position[i] = 0.0
+        points.facing[i] = 0.0
+        points.frame[i] = 0.0
         return
     dx, dy, dz = direction[0], direction[1], direction[2]
-    corner, weight = spots.corner[i], spots.weight[i]
+    corner, weight = points.corner[i], points.weight[i]
     for k in range(3):
         corner[k] = surface.triangles[triangle, k]
         weight[k] = barycentric[k]
@@ -135,49 +135,49 @@ def _find_spot(
     tx, ty, tz = _interpolated(surface.fibres, corner, weight)
     tx, ty, tz = _across_fibre(tx, ty, tz, nx, ny, nz)
     bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-    frame = spots.frame[i]
+    frame = points.frame[i]
     frame[0, 0], frame[0, 1], frame[0, 2] = tx, ty, tz
     frame[1, 0], frame[1, 1], frame[1, 2] = bx, by, bz
     frame[2, 0], frame[2, 1], frame[2, 2] = nx, ny, nz
-    spots.facing[i, 0], spots.facing[i, 1], spots.facing[i, 2] = gx, gy, gz
+    points.facing[i, 0], points.facing[i, 1], points.facing[i, 2] = gx, gy, gz
     x = origin[0] + distance * dx + LIFT * gx
     y = origin[1] + distance * dy + LIFT * gy
-    spots.position[i, 0] = x - math.floor(x)
-    spots.position[i, 1] = y - math.floor(y)
-    spots.position[i, 2] = origin[2] + distance * dz + LIFT * gz
+    points.position[i, 0] = x - math.floor(x)
+    points.position[i, 1] = y - math.floor(y)
+    points.position[i, 2] = origin[2] + distance * dz + LIFT * gz
     oz = max(-(nx * dx + ny * dy + nz * dz), LEAST_COSINE)
     ox, oy, oz = _scaled(-(tx * dx + ty * dy + tz * dz), -(bx * dx + by * dy + bz * dz), oz, 1.0)
-    spots.outgoing[i, 0], spots.outgoing[i, 1], spots.outgoing[i, 2] = ox, oy, oz
+    points.outgoing[i, 0], points.outgoing[i, 1], points.outgoing[i, 2] = ox, oy, oz
     red, green, blue = _interpolated(surface.albedo, corner, weight)
-    spots.albedo[i, 0], spots.albedo[i, 1], spots.albedo[i, 2] = red, green, blue
+    points.albedo[i, 0], points.albedo[i, 1], points.albedo[i, 2] = red, green, blue
     red, green, blue = _interpolated(surface.specular, corner, weight)
-    spots.specular[i, 0], spots.specular[i, 1], spots.specular[i, 2] = red, green, blue
+    points.specular[i, 0], points.specular[i, 1], points.specular[i, 2] = red, green, blue
     for k in range(2):
         total = 0.0
         for c in range(3):
             total += weight[c] * surface.roughness[corner[c], k]
-        spots.roughness[i, k] = total
+        points.roughness[i, k] = total
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def find_spots(
+def find_shading_points(
     origins: FloatArray,
     direction: FloatArray,
     distance: FloatArray,
     triangle: NDArray[np.int64],
     barycentric: FloatArray,
     surface: Cloth,
-    spots: Spots,
+    points: ShadingPoints,
 ) -> None:
-    """Fill ``spots`` with what rays along ``direction`` (3,) have hit first."""
+    """Fill ``points`` with what rays along ``direction`` (3,) have hit first."""
     for i in prange(len(triangle)):
-        _find_spot(
-            origins[i], direction, distance[i], triangle[i], barycentric[i], surface, spots, i
+        _find_point(
+            origins[i], direction, distance[i], triangle[i], barycentric[i], surface, points, i
         )
 
 
 @njit(cache=True, error_model="numpy")
-def faces(facing: FloatArray, normal: FloatArray, light: FloatArray) -> bool:
+def light_is_above(facing: FloatArray, normal: FloatArray, light: FloatArray) -> bool:
     """Tell whether a light is above both the triangle and the smooth surface."""
     return (
         facing[0] * light[0] + facing[1] * light[1] + facing[2] * light[2] > 0.0
@@ -186,19 +186,19 @@ def faces(facing: FloatArray, normal: FloatArray, light: FloatArray) -> bool:
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def count_lit(
+def count_lights_above(
     facing: FloatArray, normal: FloatArray, lights: FloatArray, count: NDArray[np.int64]
 ) -> None:
     """Count the lights (L, 3) that are above each place (N, 3)."""
     for i in prange(len(facing)):
         number = 0
         for k in range(len(lights)):
-            number += faces(facing[i], normal[i], lights[k])
+            number += light_is_above(facing[i], normal[i], lights[k])
         count[i] = number
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def list_rays(
+def list_shadow_rays(
     position: FloatArray,
     facing: FloatArray,
     normal: FloatArray,
@@ -211,7 +211,7 @@ def list_rays(
     for i in prange(len(facing)):
         row = first[i]
         for k in range(len(lights)):
-            if faces(facing[i], normal[i], lights[k]):
+            if light_is_above(facing[i], normal[i], lights[k]):
                 for c in range(3):
                     origins[row, c] = position[i, c]
                     directions[row, c] = lights[k, c]
@@ -219,8 +219,8 @@ def list_rays(
 
 
 @njit(cache=True, error_model="numpy")
-def _shade_spot(
-    spots: Spots,
+def _shade_point(
+    points: ShadingPoints,
     i: int,
     share: float,
     lights: FloatArray,
@@ -229,27 +229,27 @@ def _shade_spot(
     reflected: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Add to out (L, 3) the share of spot i; its shadow rays are the rows from ``row`` on."""
-    frame, albedo, corner = spots.frame[i], spots.albedo[i], spots.corner[i]
-    ox, oy, oz = spots.outgoing[i, 0], spots.outgoing[i, 1], spots.outgoing[i, 2]
-    along, across = spots.roughness[i, 0], spots.roughness[i, 1]
-    fifth_o = half_fifth(oz)
+    """Add to out (L, 3) the share of point i; its shadow rays are the rows from ``row`` on."""
+    frame, albedo, corner = points.frame[i], points.albedo[i], points.corner[i]
+    ox, oy, oz = points.outgoing[i, 0], points.outgoing[i, 1], points.outgoing[i, 2]
+    along, across = points.roughness[i, 0], points.roughness[i, 1]
+    fifth_o = diffuse_falloff(oz)
     f0, rise, body = np.empty(3), np.empty(3), np.empty(3)
     for c in range(3):
-        f0[c] = spots.specular[i, c]
+        f0[c] = points.specular[i, c]
         rise[c] = grazing_fresnel(f0[c]) - f0[c]
         body[c] = albedo[c] * transmitted(f0[c], fifth_o) / mean_transmitted(f0[c])
     if len(reflected) > 0:
         soft = share * transmitted((f0[0] + f0[1] + f0[2]) / 3, fifth_o)
         for k in range(3):
-            weight = soft * spots.weight[i, k]
+            weight = soft * points.weight[i, k]
             around = reflected[corner[k]]
             for light in range(len(lights)):
                 for c in range(3):
                     out[light, c] += weight * albedo[c] * around[light, c]
     for light in range(len(lights)):
         to_light = lights[light]
-        if not faces(spots.facing[i], frame[2], to_light):
+        if not light_is_above(points.facing[i], frame[2], to_light):
             continue
         row += 1
         if blocked[row - 1]:
@@ -258,8 +258,8 @@ def _shade_spot(
         ix = frame[0, 0] * lx + frame[0, 1] * ly + frame[0, 2] * lz
         iy = frame[1, 0] * lx + frame[1, 1] * ly + frame[1, 2] * lz
         iz = frame[2, 0] * lx + frame[2, 1] * ly + frame[2, 2] * lz
-        fifth_i = half_fifth(iz)
-        lobe, schlick = microfacets(ix, iy, iz, ox, oy, oz, along, across)
+        fifth_i = diffuse_falloff(iz)
+        lobe, schlick = microfacet_lobe(ix, iy, iz, ox, oy, oz, along, across)
         for c in range(3):
             gloss = math.pi * lobe * (f0[c] + rise[c] * schlick)
             value = gloss + body[c] * (1.0 - f0[c] - rise[c] * fifth_i)
@@ -268,7 +268,7 @@ def _shade_spot(
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def shade(
-    spots: Spots,
+    points: ShadingPoints,
     begin: int,
     samples: int,
     lights: FloatArray,
@@ -277,7 +277,7 @@ def shade(
     reflected: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill out (L, texels, 3) with mean radiances; texel j has the spots begin + samples j + ….
+    """Fill out (L, texels, 3) with mean radiances; texel j has the points begin + samples j + ….
 
     first: (texels * samples,) rows of ``blocked``. reflected: (V, L, 3) irradiance / pi from other
     surfaces, or (0, L, 3) for none.
@@ -287,8 +287,8 @@ def shade(
         place[:] = 0.0
         for s in range(samples):
             local = texel * samples + s
-            if spots.corner[begin + local, 0] >= 0:
-                _shade_spot(
-                    spots, begin + local, 1.0 / samples, lights, first[local], blocked,
+            if points.corner[begin + local, 0] >= 0:
+                _shade_point(
+                    points, begin + local, 1.0 / samples, lights, first[local], blocked,
                     reflected, place,
                 )  # fmt: skip

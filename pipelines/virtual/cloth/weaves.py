@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.virtual.cloth.mesh import Cloth, join, part, sheet
-from pipelines.virtual.cloth.yarns import FloatArray, ply_outline, smooth_noise, sweep, wind
+from pipelines.virtual.cloth.mesh import Cloth, cloth_of_tubes, cloth_sheet, join_cloths
+from pipelines.virtual.cloth.yarns import FloatArray, ply_outline, smooth_noise, sweep, wind_pattern
 
 __all__ = ["MATERIALS", "Cloth", "Recipe", "make_cloth"]
 
@@ -57,7 +57,7 @@ def _grid(cells: int, z: float = 0.0) -> FloatArray:
 
 def _backing(z: float, albedo: tuple[float, float, float]) -> Cloth:
     """Matt cloth behind the yarns: what shows between them."""
-    return sheet(_grid(40, z), fibres=(0.0, 1.0, 0.0), albedo=albedo)
+    return cloth_sheet(_grid(40, z), fibres=(0.0, 1.0, 0.0), albedo=albedo)
 
 
 def _ringed(values: FloatArray) -> FloatArray:
@@ -121,13 +121,15 @@ def _woven(
     thick = np.exp(yarns.slubs * (waves + 0.8 * np.maximum(waves - 0.8, 0.0)))
     pattern = smooth_noise(rng, shape, (steps / 24, 1.1))
     relief = ply_outline(yarns.plies, corners) * (1 + yarns.bundles * pattern)
-    radii = yarns.radius * thick.clip(0.65, 1.8)[..., None] * wind(relief, yarns.turns)
+    radii = yarns.radius * thick.clip(0.65, 1.8)[..., None] * wind_pattern(relief, yarns.turns)
     period = (1.0, 0.0, 0.0) if way == 0 else (0.0, 1.0, 0.0)
     tubes = sweep(centres, radii, period=period, flatness=yarns.flatness, turns=yarns.turns)
-    shade = wind(0.6 * pattern + 0.8 * smooth_noise(rng, shape, (steps / 48, 0.8)), yarns.turns)
+    shade = wind_pattern(
+        0.6 * pattern + 0.8 * smooth_noise(rng, shape, (steps / 48, 0.8)), yarns.turns
+    )
     tone = 1 + yarns.uneven * rng.standard_normal((count, 1, 1)) + yarns.speckle * shade
     tone = _ringed(tone.clip(0.25, 2.0))[..., None]
-    return part(
+    return cloth_of_tubes(
         tubes,
         albedo=tone * np.array(yarns.colour),
         specular=np.array(yarns.specular) * np.sqrt(tone),
@@ -147,7 +149,7 @@ def _silk(rng: np.random.Generator) -> Cloth:
         uneven=0.12, speckle=0.14, bundles=0.06,
     )  # fmt: skip
     checks = (np.arange(warp.number)[:, None] + np.arange(weft.number)) % 2 == 0
-    return join(
+    return join_cloths(
         _woven(rng, warp, checks, 0.0075, 1, 0.9),
         _woven(rng, weft, ~checks.T, 0.0055, 0, 0.9),
         _backing(-0.02, (0.10, 0.02, 0.03)),
@@ -166,7 +168,7 @@ def _twill(rng: np.random.Generator) -> Cloth:
         speckle=0.12, bundles=0.08,
     )  # fmt: skip
     over = (np.arange(12)[:, None] - np.arange(12)) % 4 != 0
-    return join(
+    return join_cloths(
         _woven(rng, warp, over, 0.03, 1, 0.9),
         _woven(rng, weft, ~over.T, 0.03, 0, 0.9),
         _backing(-0.075, (0.1, 0.1, 0.12)),
@@ -205,17 +207,23 @@ def _knit(rng: np.random.Generator) -> Cloth:
     pattern = smooth_noise(rng, shape, (9.0, 0.9))
     furrow = ply_outline(plies, corners, 0.6)
     thick = 1 + 0.05 * smooth_noise(rng, (courses, steps), (14.0,))
-    radii = 0.049 * thick[..., None] * wind(furrow * (1 + 0.07 * pattern), turns)
+    radii = 0.049 * thick[..., None] * wind_pattern(furrow * (1 + 0.07 * pattern), turns)
     tubes = sweep(centres, radii, period=(1.0, 0.0, 0.0), turns=0.4 * turns)
     fine = smooth_noise(rng, shape, (7.0, 0.6))
     # Heather: fibres of other dyes among the rest.
     heather = 0.12 * smooth_noise(rng, (3, *shape), (7.0, 0.6)) ** 2
-    tone = 1 + 0.06 * rng.standard_normal((courses, 1, 1)) + wind(0.1 * pattern + 0.2 * fine, turns)
-    tone *= wind(np.broadcast_to(furrow**0.7, shape), turns)
-    mixed = np.stack([wind(h, turns) for h in heather], axis=-1)
+    tone = (
+        1
+        + 0.06 * rng.standard_normal((courses, 1, 1))
+        + wind_pattern(0.1 * pattern + 0.2 * fine, turns)
+    )
+    tone *= wind_pattern(np.broadcast_to(furrow**0.7, shape), turns)
+    mixed = np.stack([wind_pattern(h, turns) for h in heather], axis=-1)
     albedo = tone.clip(0.3, 1.8)[..., None] * (colour + (0.10, 0.07, 0.05) * mixed)
-    yarn = part(tubes, albedo=_ringed(albedo), specular=(0.035, 0.03, 0.025), roughness=(0.5, 0.9))
-    return join(yarn, _backing(-0.09, (0.25, 0.07, 0.03)))
+    yarn = cloth_of_tubes(
+        tubes, albedo=_ringed(albedo), specular=(0.035, 0.03, 0.025), roughness=(0.5, 0.9)
+    )
+    return join_cloths(yarn, _backing(-0.09, (0.25, 0.07, 0.03)))
 
 
 # --------------------------------------------------------------------------------------------
@@ -245,7 +253,7 @@ def _corduroy(rng: np.random.Generator) -> Cloth:
     tone = 1 + 0.16 * ends + 0.08 * clumps + 0.10 * smooth_noise(rng, shape, (1.0, 1.0))
     # Down between the tufts and in the furrow less light comes out of the fibres.
     shade = (0.3 + 0.7 * np.sqrt(rib)) * tone.clip(0.4, 1.7)
-    return sheet(
+    return cloth_sheet(
         grid,
         fibres=pile * rib[..., None] + furrow,
         albedo=(shade[..., None] * colour).clip(0.0, 0.9),

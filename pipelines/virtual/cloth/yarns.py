@@ -75,7 +75,7 @@ def sweep(
     normals = np.cross(around, down)
     # Per step, ``down`` is two of S steps and ``around`` two of A corners.
     fibres = down + (turns * corners / steps) * around
-    parts = [positions, unit(normals), unit(fibres)]
+    parts = [positions, normalize(normals), normalize(fibres)]
     if period is not None:
         parts = [np.concatenate([p, p[:, :1]], axis=1) for p in parts]
         parts[0][:, -1] += period
@@ -92,7 +92,7 @@ def _difference(points: FloatArray, period: tuple[float, float, float] | None) -
     return after - before
 
 
-def unit(vectors: FloatArray) -> FloatArray:
+def normalize(vectors: FloatArray) -> FloatArray:
     """Vectors (..., 3) at length 1; zero stays zero."""
     scaled: FloatArray = vectors / np.maximum(
         np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12
@@ -122,7 +122,7 @@ def smooth_noise(
     return smooth
 
 
-def wind(pattern: FloatArray, turns: int) -> FloatArray:
+def wind_pattern(pattern: FloatArray, turns: int) -> FloatArray:
     """Wind a pattern (Y, S, A) about its yarns by whole turns over the S steps of the period."""
     steps, corners = pattern.shape[1:]
     place = (np.arange(corners) - turns * corners * np.arange(steps)[:, None] / steps) % corners

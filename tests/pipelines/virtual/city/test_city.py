@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import moved_left, unproject_depth
 from pipelines.geometry.rays import build_scene, first_hits
-from pipelines.virtual.city.city import BEFORE, BEYOND, City, city
+from pipelines.virtual.city.city import BEFORE, BEYOND, City, make_city
+from pipelines.virtual.city.drive import plan_drive
 from pipelines.virtual.city.light import sky_visibility
-from pipelines.virtual.city.materials import city_textures, evened, repeatable
+from pipelines.virtual.city.materials import city_textures, even_brightness, make_tileable
 from pipelines.virtual.city.parts import MATERIALS, MEAN_TEXEL, POSTERS, Look, box, panel
 from pipelines.virtual.city.photographing import CityStage
-from pipelines.virtual.city.simulated_drive import plan_drive
 from storage.readers.street_photographs import street_photographs
 
 Photographs = dict[str, NDArray[np.uint8]]
@@ -22,7 +22,7 @@ WIDTH, HEIGHT = 160, 100
 
 @pytest.fixture(scope="module")
 def short() -> City:
-    return city(12.0, seed=5)
+    return make_city(12.0, seed=5)
 
 
 @pytest.fixture(scope="module")
@@ -61,14 +61,14 @@ def test_triangles_are_wound_as_their_normals_say(short: City) -> None:
 
 
 def test_the_same_seed_gives_the_same_city_and_another_another(short: City) -> None:
-    again, other = city(12.0, seed=5), city(12.0, seed=6)
+    again, other = make_city(12.0, seed=5), make_city(12.0, seed=6)
     for mine, theirs in zip(short, again, strict=True):
         np.testing.assert_array_equal(mine, theirs)
     assert other.vertices.shape != short.vertices.shape
 
 
 def test_a_longer_city_begins_with_the_same_poles(short: City) -> None:
-    longer = city(30.0, seed=5)
+    longer = make_city(30.0, seed=5)
 
     def poles(which: City) -> NDArray[np.float64]:
         points = which.vertices[np.unique(which.triangles[which.pole])].astype(float)
@@ -121,7 +121,7 @@ def test_thin_poles_stand_along_both_pavements(short: City) -> None:
 @pytest.mark.parametrize("length", [0.0, -3.0, np.nan, np.inf])
 def test_a_length_must_be_positive(length: float) -> None:
     with pytest.raises(ValueError, match="expected metres"):
-        city(length)
+        make_city(length)
 
 
 # ---- light -------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ def test_every_material_has_a_texture_of_the_mean_that_tints_expect(
 
 
 def test_repeatable_pictures_have_no_seam(photographs: Photographs) -> None:
-    image = repeatable(evened(photographs["gravel"].astype(np.float32)))
+    image = make_tileable(even_brightness(photographs["gravel"].astype(np.float32)))
     for axis in (0, 1):
         inside = np.abs(np.diff(image, axis=axis)).mean()
         first, last = np.take(image, 0, axis), np.take(image, -1, axis)
@@ -221,7 +221,7 @@ def test_panes_look_different_from_another_place_and_walls_do_not(
     photographs: Photographs,
 ) -> None:
     """Two cameras at one place of a wall; the point is seen from two sides."""
-    full = city(12.0, seed=5)
+    full = make_city(12.0, seed=5)
     matt = full._replace(gloss=np.zeros_like(full.gloss))
     drive = plan_drive(4, 3.0, WIDTH, HEIGHT)
     pictures = []

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.cameras import moved_left
+from pipelines.virtual.city.drive import SimulatedDrive, expose_photograph, plan_drive
 from pipelines.virtual.city.drive_photographs import EXPOSURE, photograph_drive
 from pipelines.virtual.city.photographing import Shot
-from pipelines.virtual.city.simulated_drive import SimulatedDrive, photograph, plan_drive
 
 OFFSETS = (1.0, 2.5)
 
@@ -70,7 +70,7 @@ def test_photographs_have_their_exposures_and_the_noise_of_one_seed() -> None:
     random = np.random.default_rng(7)
     for frame in range(4):
         for camera in range(3):
-            expected = photograph(
+            expected = expose_photograph(
                 stage.radiance(drive.poses[frame, camera]),
                 drive.gains[frame, camera],
                 EXPOSURE,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.virtual.cloth.fibre_brdf import reflectance
+from pipelines.virtual.cloth.fibre_brdf import fibre_brdf
 
 COLUMNS = {"albedo": (0.5, 0.3, 0.1), "specular": (0.05, 0.1, 0.3), "roughness": (0.2, 0.6)}
 
@@ -34,7 +34,7 @@ def hemisphere(rings: int, spokes: int) -> tuple[np.ndarray, float]:
 
 def test_without_gloss_it_is_lamberts() -> None:
     light, view = some_directions(50, 0), some_directions(50, 1)
-    values = reflectance(light, view, albedo=(1.0, 0.5, 0.0), specular=0 * light, roughness=(1, 1))
+    values = fibre_brdf(light, view, albedo=(1.0, 0.5, 0.0), specular=0 * light, roughness=(1, 1))
     np.testing.assert_allclose(values, np.tile([1 / np.pi, 0.5 / np.pi, 0], (50, 1)), rtol=1e-12)
 
 
@@ -56,7 +56,7 @@ def test_gloss_is_the_textbooks() -> None:
     g = 1 / (1 + masking(light) + masking(view))
     fresnel = f0 + (1 - f0) * (1 - (light * half).sum(-1)) ** 5
     expected = fresnel * d * g / (4 * light[:, 2] * view[:, 2])
-    values = reflectance(light, view, albedo=(0, 0, 0), specular=(f0,) * 3, roughness=(ax, ay))
+    values = fibre_brdf(light, view, albedo=(0, 0, 0), specular=(f0,) * 3, roughness=(ax, ay))
     np.testing.assert_allclose(values[:, 0], expected, rtol=1e-9)
 
 
@@ -64,7 +64,7 @@ def test_diffuse_lobe_is_ashikhmin_and_shirleys() -> None:
     light, view = some_directions(100, 4), some_directions(100, 5)
     f0 = 0.3
     parts = [
-        reflectance(light, view, albedo=(a,) * 3, specular=(f0,) * 3, roughness=(0.3, 0.6))
+        fibre_brdf(light, view, albedo=(a,) * 3, specular=(f0,) * 3, roughness=(0.3, 0.6))
         for a in (0.0, 0.8)
     ]
     expected = (
@@ -89,7 +89,7 @@ alpha = st.floats(0.12, 1.0)
 def test_reciprocal(seed: int, albedo: float, f0: float, along: float, across: float) -> None:
     light, view = some_directions(20, seed), some_directions(20, seed + 1)
     given_ = {"albedo": (albedo,) * 3, "specular": (f0,) * 3, "roughness": (along, across)}
-    there, back = reflectance(light, view, **given_), reflectance(view, light, **given_)
+    there, back = fibre_brdf(light, view, **given_), fibre_brdf(view, light, **given_)
     np.testing.assert_allclose(there, back, rtol=1e-12, atol=1e-300)
 
 
@@ -100,7 +100,7 @@ def test_reflects_no_more_than_comes_in(
 ) -> None:
     light, weight = hemisphere(120, 240)
     view = directions(np.array(theta), np.array(phi))
-    values = reflectance(
+    values = fibre_brdf(
         light, view, albedo=(albedo,) * 3, specular=(f0,) * 3, roughness=(along, across)
     )
     assert (values >= 0).all()
@@ -111,16 +111,16 @@ def test_reflects_no_more_than_comes_in(
 def test_fibre_direction_turns_the_gloss() -> None:
     light, view = some_directions(30, 6), some_directions(30, 7)
     turned = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    one = reflectance(light, view, **COLUMNS)
+    one = fibre_brdf(light, view, **COLUMNS)
     swapped = {**COLUMNS, "roughness": COLUMNS["roughness"][::-1]}
-    np.testing.assert_allclose(reflectance(light @ turned, view @ turned, **swapped), one)
-    assert abs(reflectance(light, view, **swapped) / one - 1).max() > 0.5
+    np.testing.assert_allclose(fibre_brdf(light @ turned, view @ turned, **swapped), one)
+    assert abs(fibre_brdf(light, view, **swapped) / one - 1).max() > 0.5
 
 
 def test_nothing_from_below() -> None:
     below = np.array([0.6, 0.0, -0.8])
-    assert not reflectance(below, (0, 0, 1), **COLUMNS).any()
-    assert not reflectance((0, 0, 1), below, **COLUMNS).any()
+    assert not fibre_brdf(below, (0, 0, 1), **COLUMNS).any()
+    assert not fibre_brdf((0, 0, 1), below, **COLUMNS).any()
 
 
 @pytest.mark.parametrize(
@@ -129,4 +129,4 @@ def test_nothing_from_below() -> None:
 )
 def test_says_what_is_out_of_range(name: str, value: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match=name):
-        reflectance((0, 0, 1), (0, 0, 1), **{**COLUMNS, name: value})
+        fibre_brdf((0, 0, 1), (0, 0, 1), **{**COLUMNS, name: value})

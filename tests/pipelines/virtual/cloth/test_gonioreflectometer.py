@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.light.directions import hemisphere_table, unit_vectors
-from pipelines.virtual.cloth.fibre_brdf import reflectance
+from pipelines.virtual.cloth.fibre_brdf import fibre_brdf
 from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
-from pipelines.virtual.cloth.mesh import Cloth, join, part, sheet
+from pipelines.virtual.cloth.mesh import Cloth, cloth_of_tubes, cloth_sheet, join_cloths
 from pipelines.virtual.cloth.yarns import smooth_noise, sweep
 
 LIGHTS = np.radians([(0, 0), (30, 0), (45, 100), (60, 225), (75, 310)])
@@ -92,9 +92,9 @@ def yarns() -> Cloth:
     tone[:, -1] = tone[:, 0]
     axis = np.arange(12) / 12
     grid = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.full((12, 12), -0.12)], axis=-1)
-    return join(
-        part(tubes, albedo=tone, specular=0.15, roughness=(0.2, 0.6)),
-        sheet(grid, fibres=(0.0, 1.0, 0.0), albedo=0.3),
+    return join_cloths(
+        cloth_of_tubes(tubes, albedo=tone, specular=0.15, roughness=(0.2, 0.6)),
+        cloth_sheet(grid, fibres=(0.0, 1.0, 0.0), albedo=0.3),
     )
 
 
@@ -121,7 +121,7 @@ def test_flat_glossy_sample_reads_its_brdf(azimuth: float) -> None:
     turn = np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
     lights = unit_vectors(LIGHTS)
     for view in np.radians([(0, 0), (30, 180), (60, 45), (75, 130)]):
-        f = reflectance(
+        f = fibre_brdf(
             lights @ turn, unit_vectors(view) @ turn,
             albedo=(0.3,) * 3, specular=(0.2,) * 3, roughness=(0.15, 0.6),
         )  # fmt: skip

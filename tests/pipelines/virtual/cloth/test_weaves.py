@@ -77,8 +77,8 @@ def test_looks_like_cloth_from_everywhere(measured: Measured) -> None:
 
 def test_no_view_passes_through(measured: Measured) -> None:
     for towards in unit_vectors([*ANGLES, (1.3, 0.4), (1.39, 3.0)]):
-        spots = measured.gonio._seen(measured.gonio._places, towards)
-        assert (spots.corner >= 0).all()
+        points = measured.gonio._seen(measured.gonio._places, towards)
+        assert (points.corner >= 0).all()
 
 
 def test_mean_is_reciprocal(measured: Measured) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.virtual.cloth.yarns import ply_outline, smooth_noise, sweep, wind
+from pipelines.virtual.cloth.yarns import ply_outline, smooth_noise, sweep, wind_pattern
 
 RADIUS = 0.1
 
@@ -78,7 +78,7 @@ def test_noise_has_its_variance_and_is_periodic() -> None:
 def test_winding_by_whole_turns() -> None:
     pattern = smooth_noise(np.random.default_rng(2), (1, 48, 24), (0.0, 2.0))
     pattern[:] = pattern[:, :1]
-    wound = wind(pattern, 2)
+    wound = wind_pattern(pattern, 2)
     np.testing.assert_allclose(wound[:, 0], pattern[:, 0])
     np.testing.assert_allclose(wound[:, 24], pattern[:, 0], atol=1e-12)  # one turn on
     np.testing.assert_allclose(wound[0, 6], np.roll(pattern[0, 0], 6), atol=1e-12)

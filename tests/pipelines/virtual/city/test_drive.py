@@ -7,7 +7,7 @@ import pytest
 
 from pipelines.drawing.colour import decode_srgb, to_8bit
 from pipelines.geometry.cameras import moved_left, project_points
-from pipelines.virtual.city.simulated_drive import photograph, plan_drive
+from pipelines.virtual.city.drive import expose_photograph, plan_drive
 
 
 def test_poses_are_rotations_that_look_ahead_with_the_horizon_level() -> None:
@@ -95,14 +95,16 @@ def test_sizes_must_be_positive(arguments: tuple[int, float, int, int]) -> None:
 
 def test_without_noise_a_photograph_is_the_exposed_radiance() -> None:
     radiance = np.random.default_rng(0).random((7, 9, 3)).astype(np.float32)
-    seen = photograph(radiance, 1.1, 0.8, 0.0, np.random.default_rng(1))
+    seen = expose_photograph(radiance, 1.1, 0.8, 0.0, np.random.default_rng(1))
     np.testing.assert_array_equal(seen, to_8bit(radiance.astype(np.float64) * (1.1 * 0.8)))
 
 
 @pytest.mark.parametrize("level", [0.02, 0.2, 0.8])
 def test_noise_has_the_size_that_is_said_and_no_bias(level: float) -> None:
     radiance = np.full((200, 200, 3), level, np.float32)
-    light = decode_srgb(photograph(radiance, 1.0, 1.0, 0.01, np.random.default_rng(2)) / 255.0)
+    light = decode_srgb(
+        expose_photograph(radiance, 1.0, 1.0, 0.01, np.random.default_rng(2)) / 255.0
+    )
     expected = 0.01 * np.sqrt((level + 0.1) / 1.1)
     assert light.std() == pytest.approx(expected, rel=0.06)
     assert light.mean() == pytest.approx(level, abs=2e-4)

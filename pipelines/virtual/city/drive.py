@@ -91,7 +91,7 @@ def _pose(x: float, y: float, heading: float, z: float) -> FloatArray:
     )
 
 
-def photograph(
+def expose_photograph(
     radiance: NDArray[np.floating],
     gain: float,
     exposure: float,
