@@ -60,13 +60,13 @@ def _tone_error(version: StoredVersion) -> float:
 def _light_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
-    from pipelines.drawing.colour import exposure, to_8bit
+    from pipelines.drawing.colour import auto_exposure, to_8bit
     from pipelines.light.environment_maps import texel_directions
     from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
 
     radiance = dataset["radiance"].values
     again = evaluate(lights_of(dataset), texel_directions(len(radiance)))
-    scale = exposure(radiance)
+    scale = auto_exposure(radiance)
     times = max(1, 512 // radiance.shape[1])
     both = np.vstack([to_8bit(part * scale) for part in (radiance, again)])
     return {"environment-above-lights": both.repeat(times, axis=0).repeat(times, axis=1)}

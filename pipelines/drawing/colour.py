@@ -30,7 +30,7 @@ def to_8bit(linear: ArrayLike) -> NDArray[np.uint8]:
     return np.rint(encode_srgb(linear) * 255.0).astype(np.uint8)
 
 
-def exposure(radiance: NDArray[np.floating]) -> float:
+def auto_exposure(radiance: NDArray[np.floating]) -> float:
     """Factor that brings the 99 % quantile of radiance (any shape) to 0.8."""
     bright = float(np.quantile(np.maximum(radiance.astype(np.float32), 0.0), 0.99))
     return _AIM / max(bright, 1e-6)

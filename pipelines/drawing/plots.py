@@ -17,7 +17,7 @@ def new_figure(width: float, height: float) -> tuple[Any, Any]:
     return figure, FigureCanvasAgg(figure)
 
 
-def drawn(canvas: Any) -> NDArray[np.uint8]:
+def canvas_picture(canvas: Any) -> NDArray[np.uint8]:
     """The picture (y, x, 3) of a canvas."""
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, orbit, surface
 from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
@@ -118,7 +118,7 @@ def draw_frames(
         fine[seen] = np.maximum(radiance * _dimming(towards[:, 2])[:, None], 0.0)
         pictures[number] = fine.reshape(height, s, width, s, 3).mean(axis=(1, 3))
     cloth = seen.reshape(height, s, width, s).mean(axis=(1, 3))
-    scale = exposure(pictures[:, cloth == 1.0])
+    scale = auto_exposure(pictures[:, cloth == 1.0])
     behind = (1.0 - cloth)[..., None] * np.array(BACKGROUND)
     return Frames(to_8bit(pictures * scale + behind), float(cloth.mean()))
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.contact_sheet import contact_sheet
-from pipelines.drawing.plots import drawn, new_figure
+from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.light.directions import Pairs, angles_between, unit_vectors
 
 _DIFFERENCE_TIMES = 4
@@ -41,7 +41,7 @@ def shown_images(pairs: Pairs) -> NDArray[np.int64]:
 
 def photograph_sheet(images: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Photographs (n, y, x, 3) side by side, exposed alike, tiles of at least 192 pixels."""
-    encoded = to_8bit(images.astype(np.float32) * exposure(images))
+    encoded = to_8bit(images.astype(np.float32) * auto_exposure(images))
     times = max(1, -(-192 // min(images.shape[1:3])))
     large = encoded.repeat(times, axis=1).repeat(times, axis=2)
     return np.hstack([np.pad(one, ((4, 4), (4, 4), (0, 0))) for one in large])
@@ -59,7 +59,7 @@ def restored_picture(
     for row, (measured, given, light, view) in enumerate(
         zip(original, restored, pairs.light, pairs.view, strict=True)
     ):
-        scale = exposure(measured)
+        scale = auto_exposure(measured)
         rmse = float(np.sqrt(np.mean((given - measured) ** 2)))
         difference = np.abs(given - measured) * scale * _DIFFERENCE_TIMES
         for axis, picture, title in (
@@ -74,7 +74,7 @@ def restored_picture(
             axis.imshow(picture, interpolation="nearest")
             axis.set_title(title, fontsize=9)
             axis.set_axis_off()
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def cluster_map(ids: NDArray[np.integer], height: int, width: int) -> NDArray[np.uint8]:
@@ -92,7 +92,7 @@ def loss_curve(step: NDArray[np.integer], rmse: NDArray[np.floating]) -> NDArray
     axis.plot(step, rmse, color="tab:blue")
     axis.set(xlabel="step", ylabel="RMSE of the batches, over alpha", yscale="log")
     axis.grid(alpha=0.3, which="both")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def error_picture(
@@ -114,7 +114,7 @@ def error_picture(
         axis.set(aspect="equal", xlim=(-1.1, 1.1), ylim=(-1.1, 1.1))
         axis.set_axis_off()
         figure.colorbar(points, ax=axis)
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.plots import drawn, new_figure
+from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.photo_fur.attenuation import Attenuation
 
 
@@ -38,7 +38,7 @@ def decay_picture(
     right.plot(np.arange(layers + 1) / layers, boundaries, "o", color="tab:red", markersize=4)
     right.set(xlabel="depth / thickness", ylabel="luminance (linear)", xlim=(0, 1), ylim=(0, None))
     right.set_title(f"I(h) = Imax exp(-{attenuation.coefficient:.3g} h), {layers} layers")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def layer_picture(layer: NDArray[np.uint8], layers: int) -> NDArray[np.uint8]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.plots import drawn, new_figure
+from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.glass_scratches.tables.bins import bin_centres
 
 _SHOWN_INCIDENCES = (0.0, 30.0, 60.0)
@@ -22,7 +22,7 @@ def profile_picture(points: NDArray[np.float64]) -> NDArray[np.uint8]:
     axis.fill(np.concatenate([v, v[[-1, 0]]]), np.concatenate([n, [low, low]]), color="#9fc5d8")
     axis.plot(points[:, 0], points[:, 1], color="#20506a")
     axis.set(xlabel="v, µm", ylabel="n, µm", aspect="equal")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -55,7 +55,7 @@ def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
         right.fill(angles, lobe, color=colour, alpha=0.12)
     right.set_ylim(0.0, 1.1 * longest)
     right.legend(loc="lower center", fontsize=8)
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def lean_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -72,7 +72,7 @@ def lean_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDA
         axis.plot([0, 60, 90], factor[:, at], "o", color="0.3", markersize=4)
     axis.set(xlabel="θo, degrees", ylabel="ρs / ρm", ylim=(0, 1.05))
     axis.legend(fontsize=8)
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def furnace_picture(radiance: NDArray[np.floating]) -> NDArray[np.uint8]:
@@ -83,4 +83,4 @@ def furnace_picture(radiance: NDArray[np.floating]) -> NDArray[np.uint8]:
     axis.set_title("in an environment of radiance 1", fontsize=9)
     axis.set_axis_off()
     figure.colorbar(shown, ax=axis)
-    return drawn(canvas)
+    return canvas_picture(canvas)

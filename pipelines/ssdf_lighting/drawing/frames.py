@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import exposure, to_8bit
+from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, fitting_distance, orbit, surface
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
@@ -209,4 +209,4 @@ def exposed(radiance: NDArray[np.floating], scale: float) -> NDArray[np.uint8]:
 
 def scene_exposure(turn: TurningLight) -> float:
     """Factor that brings the brighter part of the scene's pixels, of all frames, to 0.8."""
-    return exposure(turn.radiance[:, turn.covered > 0.5])
+    return auto_exposure(turn.radiance[:, turn.covered > 0.5])

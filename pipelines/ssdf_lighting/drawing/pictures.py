@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.contact_sheet import contact_sheet
-from pipelines.drawing.plots import drawn, new_figure
+from pipelines.drawing.plots import canvas_picture, new_figure
 
 _SIDE = 160  # pixels of a map
 
@@ -46,7 +46,7 @@ def cluster_sizes_picture(cluster: NDArray[np.integer]) -> NDArray[np.uint8]:
     axes = figure.add_subplot()
     axes.bar(np.arange(len(sizes)), sizes, width=1.0, color="#2166ac")
     axes.set(xlabel="clusters, largest first", ylabel="vertices")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def error_histogram(vertex_rmse: NDArray[np.floating], rmse: float) -> NDArray[np.uint8]:
@@ -59,7 +59,7 @@ def error_histogram(vertex_rmse: NDArray[np.floating], rmse: float) -> NDArray[n
     axes.axvline(rmse, color="#d95f0e", label=f"all: {rmse:.4f} rad")
     axes.set(xscale="log", xlabel="RMSE of a vertex, rad", ylabel="vertices")
     axes.legend()
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def rate_distortion_picture(curve: Mapping[str, Mapping[str, Any]]) -> NDArray[np.uint8]:
@@ -78,7 +78,7 @@ def rate_distortion_picture(curve: Mapping[str, Mapping[str, Any]]) -> NDArray[n
     axes.set(xscale="log", yscale="log", xlabel="bytes", ylabel="RMSE, rad")
     axes.grid(alpha=0.3)
     figure.legend(loc="outside right center", title="form, clusters", fontsize=7)
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def cluster_colours(count: int) -> NDArray[np.float32]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.plots import drawn, new_figure
+from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.textures.atlases import Page
 from pipelines.street_billboards.textures.forms import (
@@ -51,7 +51,7 @@ def points_picture(positions: NDArray[np.floating], colours: Picture) -> Picture
         axes[number].set_ylabel(f"{name}, m")
     axes[1].set_xlabel("x, m")
     axes[0].set_title("points from above, and from the side")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def plan_picture(billboards: Billboards) -> Picture:
@@ -72,7 +72,7 @@ def plan_picture(billboards: Billboards) -> Picture:
     axes.set_aspect("equal")
     axes.autoscale()
     axes.set(xlabel="x, m", ylabel="y, m", title="billboards: still (blue), turning (red)")
-    return drawn(canvas)
+    return canvas_picture(canvas)
 
 
 def views_sheet(views: ViewTextures) -> Picture:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage.color import rgb2xyz
 
-from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance, to_8bit
+from pipelines.drawing.colour import (
+    auto_exposure,
+    decode_srgb,
+    encode_srgb,
+    luminance,
+    to_8bit,
+)
 
 LINEAR_OF_CODE = {0: 0.0, 1: 0.000304, 10: 0.003035, 11: 0.003347, 128: 0.215861, 188: 0.502886}
 """8-bit sRGB codes and their linear light, as colour tables print them."""
@@ -71,3 +79,19 @@ def test_luminance_of_each_primary_and_of_grey() -> None:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_luminance_keeps_the_dtype(dtype: type) -> None:
     assert luminance(np.ones((2, 2, 3), dtype)).dtype == dtype
+
+
+@given(st.floats(1e-3, 1e3))
+def test_exposure_answers_brightness_inversely(times: float) -> None:
+    picture = np.random.default_rng(0).gamma(1, 0.3, (12, 10, 3))
+    exposure = auto_exposure(picture * times)
+    assert exposure == pytest.approx(auto_exposure(picture) / times, rel=1e-5)
+
+
+def test_exposure_brings_the_brighter_part_to_0_8() -> None:
+    ramp = np.linspace(0, 7, 1001)
+    assert np.quantile(ramp * auto_exposure(ramp), 0.99) == pytest.approx(0.8)
+
+
+def test_a_black_picture_can_be_exposed() -> None:
+    assert math.isfinite(auto_exposure(np.zeros((3, 3))))

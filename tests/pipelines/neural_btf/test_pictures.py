@@ -6,18 +6,15 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf.pictures import (
     PAPER_PAIRS,
     cluster_map,
     error_picture,
-    exposure,
     loss_curve,
     nearest_images,
     photograph_sheet,
@@ -88,24 +85,6 @@ def test_shown_photographs_are_different_and_the_first_is_from_above(count: int)
     assert numbers[0] == 0
 
 
-# ---- exposure --------------------------------------------------------------------------------
-
-
-@given(st.floats(1e-3, 1e3))
-def test_exposure_answers_brightness_inversely(times: float) -> None:
-    picture = some_photographs().astype(np.float64)
-    assert exposure(picture * times) == pytest.approx(exposure(picture) / times, rel=1e-5)
-
-
-def test_exposure_brings_the_brighter_part_to_0_8() -> None:
-    ramp = np.linspace(0, 7, 1001)
-    assert np.quantile(ramp * exposure(ramp), 0.99) == pytest.approx(0.8)
-
-
-def test_a_black_picture_can_be_exposed() -> None:
-    assert math.isfinite(exposure(np.zeros((3, 3))))
-
-
 # ---- sheets ----------------------------------------------------------------------------------
 
 
@@ -114,7 +93,7 @@ def test_a_sheet_shows_the_photographs_side_by_side_exposed_alike() -> None:
     sheet = photograph_sheet(images)
     assert_picture(sheet, least=192)
     times = math.ceil(192 / 10)
-    encoded = to_8bit(images * exposure(images))
+    encoded = to_8bit(images * auto_exposure(images))
     assert sheet.shape == (12 * times + 8, 3 * (10 * times + 8), 3)
     for number in range(3):
         left = number * (10 * times + 8) + 4
