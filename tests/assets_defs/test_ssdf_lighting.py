@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+import tsuya
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.graph import SSDF
@@ -25,6 +26,7 @@ from pipelines.ssdf_lighting.compression.compact_memory import (
 )
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.distances import refined, visibility
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing import frames
 from pipelines.ssdf_lighting.light import environment_fit
 from pipelines.ssdf_lighting.light.spherical_gaussians import rotated
@@ -67,6 +69,26 @@ def test_the_stored_file_decodes_to_the_matrix(good: Any) -> None:
     errors = stored["vertex_rmse"].values[list(rows)]
     assert np.sqrt(((found - matrix[list(rows)]) ** 2).mean()) < 2.0 * errors.max()
     assert stored["bytes_file"] < 0.02 * matrix.nbytes
+
+
+def test_what_is_stored_is_loaded_as_the_systems_own_objects(good: Any) -> None:
+    store = good.workspace.root / "store"
+    matrix = tsuya.open("ssdf_lighting/ssdf_matrix/teapot", store)["distances"].values
+    basis = tsuya.load("ssdf_lighting/ssdf_basis/teapot", store)
+    rows, stored = (
+        np.arange(0, len(matrix), 50),
+        tsuya.open("ssdf_lighting/ssdf_basis/teapot", store),
+    )
+    off = (basis.distances(rows) - matrix[rows]) * root_weights(matrix.shape[1])
+    errors = np.sqrt((off.astype(np.float64) ** 2).mean(axis=1))
+    np.testing.assert_allclose(errors, stored["vertex_rmse"].values[rows], rtol=1e-3)
+    seen = tsuya.load("ssdf_lighting/visibility/teapot", store)
+    np.testing.assert_array_equal(seen, matrix > 0)
+    lit = tsuya.load("ssdf_lighting/scene_mesh/teapot", store)
+    clusters = tsuya.load("ssdf_lighting/triangle_clusters/teapot", store)
+    assert len(lit.vertices) == len(clusters.vertex) == len(matrix)
+    assert len(lit.triangles) == len(clusters.triangle)
+    assert tsuya.load("ssdf_lighting/environment_lights/sky", store).axes.shape == (6, 3)
 
 
 def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:

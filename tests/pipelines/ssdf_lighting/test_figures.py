@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipelines.geometry import shapes
 from pipelines.geometry.meshes import vertex_normals
 from pipelines.geometry.rays import build_scene
+from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
 from pipelines.ssdf_lighting.distances.signed_distance import (
     distances_to_arcs,
@@ -18,13 +19,24 @@ from pipelines.ssdf_lighting.distances.signed_distance import (
 )
 from pipelines.ssdf_lighting.distances.visibility import RayOrigins, ray_origins, visible_directions
 from pipelines.ssdf_lighting.distances.visible_edge import visible_edge
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.figures import (
     all_pairs_distances,
     border_step,
     compression_errors,
     distance_error,
+    errors_along_axes,
+    mean_brightness,
+    psnr,
     sampled_rows,
+    shared_basis_rmse,
+    sign_error,
+    surface_area,
+    turned_away,
+    unused_share,
     visibility_error,
+    visible_sphere_share,
+    weighted_rmse,
 )
 
 N = 16
@@ -55,7 +67,40 @@ def test_sampled_rows_are_runs_from_end_to_end(count: int, wanted: int) -> None:
         assert len(rows) == wanted // 16 * 16
 
 
+# ---- scenes ----------------------------------------------------------------------------------
+
+
+def test_area_and_turned_normals_of_a_square() -> None:
+    flat = shapes.square(3)
+    assert surface_area(2 * flat.vertices, flat.triangles) == pytest.approx(4.0)
+    assert turned_away(flat.vertices, flat.triangles, flat.normals) == 0.0
+    assert turned_away(flat.vertices, flat.triangles, -flat.normals) == 1.0
+    # The corner at which one triangle is alone, of 18 triangles with three corners each.
+    normals = flat.normals.copy()
+    count = np.bincount(flat.triangles.ravel())
+    alone = int(np.flatnonzero(count == 1)[0])
+    normals[alone] *= -1
+    assert turned_away(flat.vertices, flat.triangles, normals) == pytest.approx(1 / 54)
+
+
 # ---- visibility ------------------------------------------------------------------------------
+
+
+def test_the_seen_share_of_the_sphere_is_weighted_by_solid_angle() -> None:
+    upper = WAYS[:, 2] > 0
+    share = visible_sphere_share(np.stack([upper, ~upper, upper]), solid_angles(N))
+    exact = solid_angles(N)[upper].sum() / (4 * math.pi)
+    assert share == pytest.approx((1 + exact) / 3, abs=1e-12)
+
+
+def test_wrong_signs_are_counted_over_blocks() -> None:
+    visible = some_maps()
+    distances = distances_to_samples(visible)
+    assert sign_error([(distances, visible)]) == 0.0
+    distances[0, :4] *= -1
+    distances[5, :8] *= -1
+    blocks = [(distances[:2], visible[:2]), (distances[2:], visible[2:])]
+    assert sign_error(blocks) == pytest.approx(12 / distances.size)
 
 
 def test_visibility_is_tested_by_another_method_and_faults_are_found() -> None:
@@ -174,6 +219,39 @@ def test_compression_errors_are_weighted_by_solid_angle() -> None:
     assert compression_errors(blocks, lambda rows: below[rows], normals).wrong_visibility == 0
 
 
+def test_errors_weighted_by_solid_angle_and_along_axes() -> None:
+    right = distances_to_samples(some_maps(8))
+    assert weighted_rmse(right, right) == 0.0
+    assert weighted_rmse(right + np.float32(0.25), right) == pytest.approx(0.25, rel=1e-5)
+    one = right.copy()
+    one[4, 33] += 1.0
+    share = solid_angles(N)[33] / (4 * math.pi)
+    assert weighted_rmse(one, right) == pytest.approx(math.sqrt(share / 8), rel=1e-5)
+    blocks = [(np.arange(0, 3), right[:3]), (np.arange(3, 8), right[3:])]
+    errors = errors_along_axes(
+        blocks, lambda vertices, axes: matrix_along(right + np.float32(0.5), vertices, axes)
+    )
+    assert errors.shape == (8, 12)
+    np.testing.assert_allclose(errors, 0.5, atol=1e-5)
+
+
+def test_the_shared_basis_misses_what_it_leaves_out() -> None:
+    right = distances_to_samples(some_maps(8))
+    weighted = right.astype(np.float64) * root_weights(N * N)
+    left, sigma, vectors = np.linalg.svd(weighted, full_matrices=False)
+    for kept in (8, 5):
+        coordinates = (left[:, :kept] * sigma[:kept]).astype(np.float32)
+        found = shared_basis_rmse(right, coordinates, vectors[:kept].T.astype(np.float32))
+        expected = math.sqrt((sigma[kept:] ** 2).sum() / right.size)
+        assert found == pytest.approx(expected, rel=1e-3, abs=1e-6)
+
+
+def test_cluster_numbers_without_a_triangle_are_found() -> None:
+    assert unused_share(np.array([2, 0, 1, 1])) == 0.0
+    assert unused_share(np.array([4, 0, 1, 1])) == 0.4
+    assert unused_share(np.array([-1, 0])) == 1.0
+
+
 def grid(size: int) -> NDArray[np.int32]:
     i, j = np.meshgrid(np.arange(size - 1), np.arange(size - 1), indexing="ij")
     a = (i * size + j).ravel()
@@ -203,3 +281,19 @@ def test_without_borders_there_is_no_step() -> None:
     errors = np.random.default_rng(1).standard_normal((9, 5)).astype(np.float32)
     assert border_step(errors, grid(3), np.zeros(9, np.int32)) == 1.0
     assert border_step(errors, grid(3), np.arange(9, dtype=np.int32)) == 1.0
+
+
+# ---- pictures --------------------------------------------------------------------------------
+
+
+def test_pictures_are_compared_where_the_scene_is_shown() -> None:
+    random = np.random.default_rng(0)
+    reference = random.integers(20, 200, (6, 8, 3)).astype(np.uint8)
+    shown = np.zeros((6, 8), bool)
+    shown[2:5] = True
+    picture = np.where(shown[..., None], reference + 10, 255).astype(np.uint8)
+    assert psnr(picture, reference, shown) == pytest.approx(20 * math.log10(25.5))
+    assert psnr(reference, reference, shown) > 100.0
+    frames = np.stack([picture, np.where(shown[..., None], 0, picture)])
+    expected = picture[shown].mean() / 2 / 255
+    assert mean_brightness(frames, shown) == pytest.approx(expected)

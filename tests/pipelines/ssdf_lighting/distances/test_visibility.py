@@ -16,7 +16,9 @@ from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.distances.visibility import (
     RayOrigins,
     ray_origins,
+    scene_visibility,
     stand_ins_for_buried,
+    unpacked,
     visible_directions,
 )
 from pipelines.ssdf_lighting.light.microfacets import Materials
@@ -379,3 +381,21 @@ def test_where_all_or_none_are_buried_each_keeps_its_own() -> None:
         share = np.where(sealed, 0.0, 0.5)
         found = stand_ins_for_buried(rays, *around, given, share, WAYS)
         np.testing.assert_array_equal(found, np.arange(count))
+
+
+# ---- whole scenes ------------------------------------------------------------------------------
+
+
+def test_a_scene_by_blocks_is_what_its_vertices_see() -> None:
+    """The court has vertices where its walls stand on the floor: their stand-ins' rows."""
+    seen = look_around(built_in_scene("court", 6, 16))
+    scene, told = seen.scene, list[float]()
+    found = scene_visibility(scene.vertices, scene.triangles, scene.normals, N, told.append)
+    np.testing.assert_array_equal(found.stored, seen.stored)
+    assert found.buried == (seen.stored != np.arange(len(seen.stored))).sum() > 0
+    assert found.sealed == seen.origins.sealed.sum()
+    np.testing.assert_array_equal(unpacked(found.visible, N * N), seen.visible[seen.stored])
+    np.testing.assert_array_equal(found.origins.points, seen.origins.points[seen.stored])
+    np.testing.assert_array_equal(found.origins.sealed, seen.origins.sealed[seen.stored])
+    assert told == sorted(told)
+    assert len(told) > 1
