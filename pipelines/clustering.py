@@ -14,6 +14,11 @@ def k_means_plus_plus(points: NDArray[np.floating], clusters: int, seed: int) ->
     Seeds are drawn one by one with probability D(x)² (one candidate a step, as in Arthur and
     Vassilvitskii 2007; paper 1, section 3.2), then Lloyd's rounds until no assignment changes.
     Raises ValueError where there are fewer different points than clusters.
+
+    >>> points = np.array([[0.0, 0.0], [0.0, 1.0], [9.0, 9.0], [9.0, 8.0]])
+    >>> cluster = k_means_plus_plus(points, 2, seed=0)
+    >>> (cluster == cluster[0]).tolist()
+    [True, True, False, False]
     """
     from sklearn.cluster import kmeans_plusplus
 

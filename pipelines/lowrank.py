@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Blocks = Callable[[], Iterable[NDArray[np.floating]]]
+ColumnBlocks = Callable[[], Iterable[NDArray[np.floating]]]
 """Starts a pass over a matrix (rows, columns): blocks (rows, some of the columns) from the left."""
 
 _OVERSAMPLING = 8
@@ -26,7 +26,7 @@ class PrincipalComponents(NamedTuple):
 
 
 def principal_components(
-    blocks: Blocks, rank: int, *, iterations: int = 2, seed: int = 0
+    blocks: ColumnBlocks, rank: int, *, iterations: int = 2, seed: int = 0
 ) -> PrincipalComponents:
     """The ``rank`` largest principal components of the rows, in ``iterations + 2`` passes.
 
@@ -37,6 +37,11 @@ def principal_components(
     is positive.
 
     Raises ValueError where ``rank`` is not between 1 and the number of rows or columns.
+
+    >>> matrix = np.outer([1.0, -1.0, 2.0, -2.0], [3.0, 0.0, 4.0])  # rank 1, columns of mean 0
+    >>> found = principal_components(lambda: [matrix[:, :2], matrix[:, 2:]], 1)
+    >>> found.scores.shape, found.loadings[:, 0].astype(float).round(4).tolist()
+    ((4, 1), [0.6, 0.0, 0.8])
     """
     random = np.random.default_rng(seed)
     rows = columns = 0

@@ -12,7 +12,11 @@ _AIM = 0.8
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
-    """Linear light to sRGB code values, both in [0, 1]; values outside are clipped."""
+    """Linear light to sRGB code values, both in [0, 1]; values outside are clipped.
+
+    >>> encode_srgb([0.0, 0.18, 1.0, 7.0]).round(3).tolist()
+    [0.0, 0.461, 1.0, 1.0]
+    """
     clipped = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.where(
         clipped <= 0.0031308, 12.92 * clipped, 1.055 * np.power(clipped, 1 / 2.4) - 0.055

@@ -32,6 +32,11 @@ def project_points(
 
     intrinsics (3, 3), to_world (4, 4) of one camera. Pixels of points behind it (depth <= 0) mean
     nothing.
+
+    >>> lens = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 40.0], [0.0, 0.0, 1.0]])
+    >>> pixel, depth = project_points(lens, np.eye(4), np.array([1.0, 0.0, 10.0]))
+    >>> pixel.tolist(), float(depth)
+    ([60.0, 40.0], 10.0)
     """
     seen = (points - to_world[:3, 3]) @ to_world[:3, :3]
     depth = seen[..., 2]

@@ -79,6 +79,13 @@ def first_hits(scene: RaycastingScene, origins: ArrayLike, directions: ArrayLike
 
     origins, directions: (N, 3), or (3,) for one that all rays share; computed in float32.
     Raises ValueError for other shapes. Memory beyond the result is bounded by RAYS_PER_BLOCK.
+
+    >>> from pipelines.geometry.shapes import square
+    >>> flat = square()
+    >>> scene = build_scene(flat.vertices, flat.triangles)
+    >>> hits = first_hits(scene, [[0.1, 0.2, 3.0], [9.0, 9.0, 3.0]], [0.0, 0.0, -1.0])
+    >>> hits.distance.astype(float).round(5).tolist(), (hits.triangle >= 0).tolist()
+    ([3.0, inf], [True, False])
     """
     import open3d as o3d
 

@@ -72,6 +72,14 @@ def repair_mesh(
 
     Raises ValueError for arrays that are not a mesh (see `meshes.check_mesh`), for a negative
     or infinite tolerance, and for a mesh of which nothing is left.
+
+    >>> from pipelines.geometry.shapes import square
+    >>> flat = square(2)
+    >>> triangles = flat.triangles.copy()
+    >>> triangles[3] = triangles[3, ::-1]  # turned over
+    >>> mesh = repair_mesh(flat.vertices, triangles)
+    >>> mesh.triangles.shape, mesh.notes[0]
+    ((8, 3), "1 triangle of open pieces turned over to face as most of their piece's area.")
     """
     points, faces = np.array(vertices, np.float64), np.array(triangles)
     check_mesh(points, faces)

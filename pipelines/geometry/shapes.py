@@ -53,6 +53,10 @@ def sphere(segments: int = 32) -> Mesh:
     so that the photograph's values agree along the equator: no seam can be seen.
 
     Raises ValueError for an odd number of segments or less than four.
+
+    >>> mesh = sphere(segments=8)
+    >>> mesh.vertices.shape, mesh.triangles.shape
+    ((130, 3), (224, 3))
     """
     _check_segments(segments, 4)
     if segments % 2:
@@ -82,6 +86,10 @@ def teapot(segments: int = 8) -> Mesh:
     discs; handle and spout tubes, seam on the inner and on the lower side.
 
     Raises ValueError for less than two segments.
+
+    >>> mesh = teapot(segments=8)
+    >>> mesh.vertices.shape, mesh.triangles.shape, mesh.uvs.shape
+    ((2205, 3), (4032, 3), (2205, 2))
     """
     _check_segments(segments, 2)
     side = cylinder_chart(swept_grid((RIM, UPPER_BODY, LOWER_BODY), segments))

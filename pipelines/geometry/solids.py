@@ -59,6 +59,12 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     Raises ValueError for arrays that are not a mesh (see `meshes.check_mesh`), for an open
     mesh, for edges in more than two triangles, for a surface with one side only (a Klein bottle)
     and for one that encloses no volume.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> inside_out = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
+    >>> mesh = make_closed_mesh(corners, inside_out)
+    >>> bool(np.linalg.det(mesh.vertices[mesh.triangles]).sum() > 0)
+    True
     """
     points, faces = np.array(vertices, np.float64), np.array(triangles)
     check_mesh(points, faces)

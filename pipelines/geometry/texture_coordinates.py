@@ -17,6 +17,12 @@ def unwrap(
     show as seams, and they may overlap on the photograph.
 
     Raises ValueError for a mesh whose vertices all are at one position.
+
+    >>> from pipelines.geometry.shapes import square
+    >>> flat = square(2)
+    >>> vertices, triangles, uvs = unwrap(flat.vertices, flat.triangles)
+    >>> vertices.shape, triangles.shape, uvs.shape
+    ((9, 3), (8, 3), (9, 2))
     """
     import xatlas
 
@@ -62,6 +68,11 @@ def texture_stretch(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike) -
     The ratio of the singular values of each triangle's map from texture to surface, weighted by
     the triangle's area. vertices (V, 3), triangles (F, 3), uvs (V, 2). Triangles without area on
     the texture count as infinitely stretched.
+
+    >>> from pipelines.geometry.shapes import square
+    >>> flat = square(2)
+    >>> round(texture_stretch(flat.vertices * [3.0, 1.0, 1.0], flat.triangles, flat.uvs), 6)
+    3.0
     """
     corners = np.asarray(triangles)
     points = np.asarray(vertices, dtype=np.float64)[corners]

@@ -96,6 +96,14 @@ def sky(
     send down, evenly.
 
     Raises ValueError for a height that is odd or below 8 and for other parameters out of range.
+
+    >>> from pipelines.light.environment_maps import texel_directions
+    >>> radiance = sky(64, sun_azimuth=45.0, sun_elevation=30.0)
+    >>> radiance.shape
+    (64, 128, 3)
+    >>> sun = radiance.sum(axis=-1).argmax()
+    >>> texel_directions(64).reshape(-1, 3)[sun].round(1).tolist()
+    [0.6, 0.6, 0.5]
     """
     if height < 8 or height % 2:
         raise ValueError(f"height is {height}; expected an even number of 8 or more.")

@@ -58,7 +58,13 @@ def hemisphere_table(count: int) -> NDArray[np.float64]:
 
 
 def all_pairs(views: NDArray[np.float64], lights: NDArray[np.float64]) -> Pairs:
-    """Every view (V, 2) with every light (L, 2), as V * L pairs."""
+    """Every view (V, 2) with every light (L, 2), as V * L pairs.
+
+    >>> table = hemisphere_table(81)
+    >>> pairs = all_pairs(table, table)
+    >>> table.shape, pairs.light.shape, pairs.view.shape
+    ((81, 2), (6561, 2), (6561, 2))
+    """
     return Pairs(light=np.tile(lights, (len(views), 1)), view=np.repeat(views, len(lights), axis=0))
 
 
@@ -74,6 +80,9 @@ def stereographic(directions: ArrayLike) -> NDArray[np.float64]:
     """Directions (..., 2) on the plane (..., 2): radius tan(theta / 2) (paper 1, Eq. 7-9).
 
     The normal is the origin, the horizon the unit circle.
+
+    >>> stereographic([[0.0, 0.0], [np.pi / 2, 0.0]]).round(6).tolist()
+    [[0.0, 0.0], [1.0, 0.0]]
     """
     theta, phi = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
     radius = np.tan(theta / 2)

@@ -47,7 +47,12 @@ def check_environment(radiance: NDArray[np.floating]) -> None:
 
 
 def texel_directions(height: int) -> FloatArray:
-    """Unit vectors (H, W, 3) to the centres of the texels. Raises ValueError for height < 1."""
+    """Unit vectors (H, W, 3) to the centres of the texels. Raises ValueError for height < 1.
+
+    >>> directions = texel_directions(4)
+    >>> directions.shape, bool(directions[0, 0, 2] > 0.9)
+    ((4, 8, 3), True)
+    """
     check_height(height)
     theta = (np.arange(height) + 0.5) * (math.pi / height)
     azimuth = math.pi - (np.arange(2 * height) + 0.5) * (math.pi / height)

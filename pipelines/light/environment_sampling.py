@@ -46,6 +46,13 @@ def make_environment_sampler(radiance: NDArray[np.floating]) -> EnvironmentSampl
 
     1 % of the mean luminance is added everywhere, so that no light is missed, be it as faint to
     the eye as blue. Raises ValueError for a map that ``check_environment`` refuses.
+
+    >>> from pipelines.light.built_in_environments import lamps
+    >>> sampler = make_environment_sampler(lamps(32))
+    >>> sampler.density.shape
+    (32, 64)
+    >>> round(float((sampler.density * solid_angles(32)[:, None]).sum()), 9)
+    1.0
     """
     check_environment(radiance)
     with np.errstate(over="ignore"):

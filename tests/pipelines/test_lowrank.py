@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.lowrank import Blocks, principal_components, right_singular_vectors
+from pipelines.lowrank import ColumnBlocks, principal_components, right_singular_vectors
 
 
 def decaying(rows: int, columns: int, *, decay: float = 0.7, seed: int = 0) -> NDArray[np.float64]:
@@ -22,7 +22,7 @@ def decaying(rows: int, columns: int, *, decay: float = 0.7, seed: int = 0) -> N
     return (left * (10 * decay ** np.arange(count))) @ right.T + random.standard_normal(columns)
 
 
-def in_blocks(matrix: NDArray[np.floating], cuts: Sequence[int] = ()) -> Blocks:
+def in_blocks(matrix: NDArray[np.floating], cuts: Sequence[int] = ()) -> ColumnBlocks:
     return lambda: np.split(matrix, sorted(cuts), axis=1)
 
 

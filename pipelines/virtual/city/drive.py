@@ -54,6 +54,10 @@ def plan_drive(
     the car's middle, in it, and to its right, at ``camera_height`` metres. A camera's gain is a
     constant of a few percent times a slow drift, whose standard deviation over a long drive is
     ``exposure_spread``. Raises ValueError for sizes that are not positive.
+
+    >>> drive = plan_drive(frames=12, spacing=2.0, width=64, height=40)
+    >>> drive.poses.shape, drive.gains.shape
+    ((12, 3, 4, 4), (12, 3))
     """
     if frames < 1 or not spacing > 0.0 or width < 1 or height < 1 or not 0 < view_angle < 180:
         raise ValueError(

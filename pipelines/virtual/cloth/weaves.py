@@ -40,6 +40,10 @@ def make_cloth(name: str, seed: int) -> Cloth:
     """Make one tile of a built-in material.
 
     Raises ValueError for a name that is not in ``MATERIALS``.
+
+    >>> cloth = make_cloth("corduroy", seed=0)
+    >>> cloth.vertices.shape, cloth.fibres.shape
+    ((83521, 3), (83521, 3))
     """
     if name not in MATERIALS:
         raise ValueError(f"material is {name!r}; expected one of {', '.join(MATERIALS)}.")

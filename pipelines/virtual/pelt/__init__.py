@@ -1,1 +1,5 @@
-"""A pelt of hairs, photographed from above, whose depths are known."""
+"""A pelt of hairs, photographed from above, whose depths are known.
+
+``pelt``: the whole of it (``make_pelt``) and what is photographed how. ``hairs``: curves grown on a
+tile; ``prisms``: what rays meet of them; ``scattering``: light among them, compiled.
+"""

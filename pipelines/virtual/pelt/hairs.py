@@ -71,6 +71,10 @@ def grow_hairs(count: int, rng: np.random.Generator) -> Hairs:
     """Grow ``count`` hairs of two populations on the unit tile.
 
     Returns hairs of POINTS_PER_HAIR points. Raises ValueError for a count below 1.
+
+    >>> hairs = grow_hairs(20, np.random.default_rng(0))
+    >>> hairs.points.shape, hairs.radii.shape, hairs.albedo.shape
+    ((20, 12, 3), (20, 12), (20, 3))
     """
     if count < 1:
         raise ValueError(f"hairs: expected at least 1, found {count}")
