@@ -1,10 +1,10 @@
 """The street on the stage, its textures decoded in the shader (4.3).
 
-A billboard is four vertices of one mesh, a page (:mod:`.atlases`) one draw call. The vertex shader
-turns the billboard to the eye, finds the two stored views beside the viewer's direction and blends
-their weights and means; the fragment shader looks at the mask's bits, multiplies samples of the
-planes by the weights, converts colours, and hands on linear light. Only the triangles of what is
-in view are sent, nearest first.
+A billboard is four vertices of one mesh, a page (see ``textures.atlases``) one draw call. The
+vertex shader turns the billboard to the eye, finds the two stored views beside the viewer's
+direction and blends their weights and means; the fragment shader looks at the mask's bits,
+multiplies samples of the planes by the weights, converts colours, and hands on linear light. Only
+the triangles of what is in view are sent, nearest first.
 
 Textures are interpolated between the middles of texels and clamped at a tile's rim. The mask is a
 bit a texel; between four middles the outline is where their interpolated bits are 0.5. A turning
