@@ -12,6 +12,7 @@ import numpy as np
 
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.road_tiles import TiledBillboards
+from pipelines.street_billboards.street_model import StreetModel
 from pipelines.street_billboards.textures.atlases import Atlas, Page
 from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
 from storage.stored_version import StoredVersion
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.frames import StreetFrames, StreetModel, Viewpoints
+    from pipelines.street_billboards.frames import StreetFrames, Viewpoints
 
 
 # ---- billboards ------------------------------------------------------------------------------
@@ -211,8 +212,6 @@ def model_of(
     depth_maps: xr.Dataset,
 ) -> StreetModel:
     """All that a street is drawn from."""
-    from pipelines.street_billboards.frames import StreetModel
-
     return StreetModel(
         billboards_of(billboards),
         pages_of(texture_atlases),

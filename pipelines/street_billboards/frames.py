@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import figures
-from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.drawing.frames import StreetStage, compared, flight
 from pipelines.street_billboards.figures import ImageMetrics
-from pipelines.street_billboards.textures.atlases import Page
-from pipelines.street_billboards.textures.forms import CompressedTextures
+from pipelines.street_billboards.street_model import StreetModel
 
 FloatArray = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
@@ -24,18 +22,6 @@ _UNSEEN = 2
 """Frames that the flight leaves out: nobody before them saw the ground that they look at."""
 _COVERED = 0.5
 """Share of a pixel from which on billboards cover it."""
-
-
-class StreetModel(NamedTuple):
-    """All that a street is drawn from."""
-
-    billboards: Billboards
-    pages: list[Page]
-    """Of the textures."""
-    textures: CompressedTextures
-    """The same, for the processor's decoder."""
-    sky: NDArray[np.float32]
-    """Radiance, equirectangular (``sky.sky_map``)."""
 
 
 class Viewpoints(NamedTuple):
@@ -98,6 +84,25 @@ def viewpoints(
     return Viewpoints(
         intrinsics, size, held, beside, flight(poses[_UNSEEN:], flight_frames, swerve)
     )
+
+
+def draw_view(
+    street: StreetModel,
+    intrinsics: FloatArray,
+    to_world: FloatArray,
+    size: tuple[int, int],
+    *,
+    supersampling: int = 2,
+) -> Pictures:
+    """What a camera (K (3, 3), pose (4, 4)) sees, (y, x, 3); size: width and height in pixels.
+
+    Raises ``drawing.stage.NoGraphicsError`` where nothing can be drawn, ValueError unless pixels
+    are square and the principal point is in the picture's middle.
+    """
+    with StreetStage(
+        street.billboards, street.pages, street.sky, size, supersampling=supersampling
+    ) as stage:
+        return to_8bit(stage.view(intrinsics, to_world).with_sky)
 
 
 def draw_frames(

@@ -38,11 +38,9 @@ def drive_sky(
 
     nearest, farthest: as for ``stereo.depth_maps``.
     """
-    some = frames[:: max(len(frames) // _SKY_FRAMES, 1)]
     views: list[SkyView] = []
-    for frame in map(load, some):
-        maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
-        views += _sky_views(frame, maps)
+    for frame in map(load, frames[:: max(len(frames) // _SKY_FRAMES, 1)]):
+        views += sky_views(frame, stereo.depth_maps(*frame, nearest=nearest, farthest=farthest))
     return sky_map(views)
 
 
@@ -52,12 +50,15 @@ def depth_before_sky(frame: RigFrame, *, nearest: float, farthest: float) -> Dep
     nearest, farthest: metres; raises ValueError as ``stereo.depth_maps`` does.
     """
     maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
-    depth = [
-        np.where(sky_pixels(view), np.float32(np.inf), view.depth)
-        for view in _sky_views(frame, maps)
-    ]
-    return DepthMaps(np.array(depth, np.float32), maps.deviation)
+    return DepthMaps(open_to_sky(sky_views(frame, maps)), maps.deviation)
 
 
-def _sky_views(frame: RigFrame, maps: DepthMaps) -> list[SkyView]:
+def open_to_sky(views: Sequence[SkyView]) -> NDArray[np.float32]:
+    """The views' depths (c, y, x), inf where their pixels show the sky."""
+    depth = [np.where(sky_pixels(view), np.float32(np.inf), view.depth) for view in views]
+    return np.array(depth, np.float32)
+
+
+def sky_views(frame: RigFrame, maps: DepthMaps) -> list[SkyView]:
+    """A frame's photographs with their depths, in which the sky is looked for."""
     return list(map(SkyView, frame.photographs, maps.depth, frame.intrinsics, frame.poses))

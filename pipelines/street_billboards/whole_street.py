@@ -1,0 +1,100 @@
+"""All steps to a street, from a few frames that fit into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.geometry.cameras import Cameras, unproject_depth
+from pipelines.street_billboards.billboards import laid_through
+from pipelines.street_billboards.capture import stereo
+from pipelines.street_billboards.capture.drive_depth import RigFrame, open_to_sky, sky_views
+from pipelines.street_billboards.capture.drive_points import (
+    LoadedByFrame,
+    drive_gains,
+    drive_points,
+)
+from pipelines.street_billboards.capture.exposure import evening_codes
+from pipelines.street_billboards.capture.point_fusion import FrameViews
+from pipelines.street_billboards.capture.sky import SkyView, sky_map
+from pipelines.street_billboards.capture.surface_depth import fill_unknown_depth
+from pipelines.street_billboards.octree import octree_leaves
+from pipelines.street_billboards.street_model import StreetModel
+from pipelines.street_billboards.textures.atlases import pages
+from pipelines.street_billboards.textures.eigen_textures import compressed
+from pipelines.street_billboards.textures.view_textures import Photographs, view_textures
+
+FloatArray = NDArray[np.float64]
+
+
+def street_of_frames(
+    frames: Sequence[RigFrame],
+    *,
+    voxel: float = 0.8,
+    least_points: int = 10,
+    nearest: float = 2.0,
+    farthest: float = 40.0,
+    error: float = 4.4,
+) -> StreetModel:
+    """All steps on frames of one rig: depth, points, billboards, textures, pages.
+
+    voxel: metres, side of an octree's leaf, which holds ``least_points`` at least; nearest,
+    farthest: metres, between which depth is looked for; error: of the textures, in codes. Of a
+    single frame every pixel of known depth becomes a point; of several those that they confirm.
+    Raises ValueError where there are none.
+    """
+    views, sky = _with_depth(frames, nearest, farthest)
+    _, height, width = views.depth.shape
+    cameras = len(frames[0].poses)
+    drive = LoadedByFrame(len(frames), lambda taken: _some(views, taken, cameras))
+    alone = len(frames) == 1
+    positions = _every_point(views) if alone else drive_points(drive).points.positions
+    leaves = octree_leaves(positions, voxel, least_points)
+    billboards = laid_through(
+        leaves, positions, Cameras(views.intrinsics, views.poses, width, height)
+    )
+    gains = drive_gains(positions, drive, cameras, farthest=farthest)
+    fill_unknown_depth(views, positions, farthest=farthest)
+    photographs = Photographs(
+        views.photographs,
+        views.depth,
+        views.deviation,
+        views.intrinsics,
+        views.poses,
+        evening_codes(gains.reshape(-1, 3)),
+    )
+    sampled = view_textures(billboards, leaves.side, photographs, farthest=farthest)
+    textures = compressed(sampled, billboards.turns, error=error)
+    return StreetModel(billboards, pages(textures), textures, sky)
+
+
+def _with_depth(
+    frames: Sequence[RigFrame], nearest: float, farthest: float
+) -> tuple[FrameViews, NDArray[np.float32]]:
+    """All photographs with their depths, frame by frame, and the sky behind them."""
+    views, skies = [], list[SkyView]()
+    for frame in frames:
+        maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
+        skies += sky_views(frame, maps)
+        views.append(FrameViews(maps.depth, maps.deviation, *frame))
+    joined = FrameViews._make(
+        np.concatenate([getattr(view, name) for view in views]) for name in FrameViews._fields
+    )
+    return joined._replace(depth=open_to_sky(skies)), sky_map(skies)
+
+
+def _some(views: FrameViews, taken: slice, cameras: int) -> FrameViews:
+    """The photographs of some frames with so many cameras each."""
+    rows = slice(taken.start * cameras, taken.stop * cameras)
+    return FrameViews._make(values[rows] for values in views)
+
+
+def _every_point(views: FrameViews) -> FloatArray:
+    """World positions (n, 3) of all pixels whose depth is known."""
+    places = []
+    for lens, pose, depth in zip(views.intrinsics, views.poses, views.depth, strict=True):
+        known = np.isfinite(depth)
+        places.append(unproject_depth(lens, pose, np.where(known, depth, 1.0))[known])
+    return np.concatenate(places)
