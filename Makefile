@@ -39,7 +39,7 @@ lint: setup      ## ruff and mypy
 	@$(VENV)/ruff format --check .
 	@$(VENV)/mypy
 
-docs: setup demo ## docs/assets.md from the schemas, docs/pictures/ from the demo
+docs: setup      ## docs/assets.md from the schemas; docs/pictures/, made for the pages
 	@$(VENV)/python -m docs.assets
 	@$(VENV)/python -m docs.pictures
 

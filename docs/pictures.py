@@ -1,4 +1,6 @@
-"""Make docs/pictures/ from the demo's current assets: ``make docs``."""
+"""Make docs/pictures/: ``make docs``.
+
+Launches what the pictures show, at the demo's sizes: more partitions than the demo has."""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from assets_defs.glass_scratches.graph import SCRATCHES
+from assets_defs.launcher import Request
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.photo_fur.graph import FUR
 from assets_defs.ssdf_lighting.graph import SSDF
@@ -28,6 +31,23 @@ from pipelines.street_billboards.textures.atlases import pages
 from storage.versions import VersionedStore
 
 FOLDER = Path(__file__).parent / "pictures"
+SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
+    FUR: {
+        "photo": ("grass", "chelsea", "pelt"),
+        "mesh": ("square", "teapot", "teapot-large"),
+    },
+    BTF: {
+        "material": BTF.dimension("material").builtin,
+        "clusters": ("none", "100"),
+    },
+    SCRATCHES: {
+        "setting": SCRATCHES.dimension("setting").builtin,
+        "object": SCRATCHES.dimension("object").builtin,
+    },
+    SSDF: {"scene": ("teapot", "court"), "environment": ("sky", "lamps")},
+    STREET: {"drive": ("city",)},
+}
+"""Keys by dimension of what the pictures show."""
 _HEIGHT = 400
 _GAP = 10
 
@@ -44,7 +64,7 @@ def make_pictures(store: VersionedStore) -> None:
     _row("fur-square.jpg", *_frames(store, "square", "pelt"))
     _row("fur-three.jpg", *(pictures[0] for pictures in frames.values()))
     _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
-    materials = BTF.dimension("material").examples
+    materials = SHOWN[BTF]["material"]
     _column(
         "btf-photographs.png",
         *(_shown(store, BTF, "btf_images", {"material": material}) for material in materials),
@@ -222,5 +242,18 @@ def _row(name: str, *pictures: NDArray[np.uint8]) -> None:
     row.save(FOLDER / name, quality=88, optimize=True)
 
 
+def make_assets() -> None:
+    """Launch what the pictures show; what is current is skipped. Raises SystemExit on failures."""
+    from tsuya.session import launch_all, open_session, report
+
+    with open_session() as session:
+        requests = [
+            Request(system, system.cross_product(keys), "demo") for system, keys in SHOWN.items()
+        ]
+        launched = launch_all(session, requests)
+    report(session, launched, as_json=False)
+
+
 if __name__ == "__main__":
-    make_pictures(Workspace.from_environment().store)
+    make_assets()
+    make_pictures(Workspace.of_checkout().store)
