@@ -35,8 +35,8 @@ from benchmarks.street_points import drawn_points
 from pipelines.drawing.stage import Stage
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
-from pipelines.street_billboards.capture.depth_refinement import filled
 from pipelines.street_billboards.capture.stereo import disparity_defaults, match
+from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
 from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
 from pipelines.street_billboards.drawing.shader_street import ShaderStreet
 from pipelines.street_billboards.drawing.stage_camera import stage_camera
@@ -326,7 +326,7 @@ def _stereo(_: Stored, __: dict[str, Any]) -> dict[str, Any]:
     pair = motorcycle()
     found, _other = match(pair.left, pair.right, pair.most)
     plain = disparity_defaults(pair.left, pair.right, pair.most)
-    dense = filled(found.disparity, pair.left)
+    dense = fill_disparity_holes(found.disparity, pair.left)
     return {
         "stereo_bad05_percent": 100 * figures.bad_pixel_share(dense, pair.disparity),
         "stereo_bad05_percent_with_holes": 100

@@ -51,13 +51,13 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
 
 def _stereo_bad(version: StoredVersion) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
-    from pipelines.street_billboards.capture.depth_refinement import filled
     from pipelines.street_billboards.capture.stereo import match
+    from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
     from storage.readers.street_photographs import motorcycle
 
     pair = motorcycle()
     found, _ = match(pair.left, pair.right, pair.most)
-    return figures.bad_pixel_share(filled(found.disparity, pair.left), pair.disparity)
+    return figures.bad_pixel_share(fill_disparity_holes(found.disparity, pair.left), pair.disparity)
 
 
 def _depth_error(version: StoredVersion) -> float | None:

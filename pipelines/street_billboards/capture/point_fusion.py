@@ -145,7 +145,7 @@ def _camera(views: FrameViews, number: int) -> tuple[FloatArray, FloatArray]:
 def _cameras(views: FrameViews, chosen: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     """Lenses (k, 4) and what takes the world to the cameras' axes (k, 4, 4)."""
     poses = np.asarray(views.poses[chosen], np.float64)
-    return _lenses(views.intrinsics[chosen]), np.linalg.inv(poses)
+    return _lenses(views.intrinsics[chosen]), np.asarray(np.linalg.inv(poses), np.float64)
 
 
 def _lenses(intrinsics: FloatArray) -> FloatArray:

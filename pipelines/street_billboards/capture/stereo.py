@@ -14,7 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture.depth_refinement import Partner, rectified_partner, refined
+from pipelines.street_billboards.capture.depth_refinement import (
+    Partner,
+    rectified_partner,
+    refine_disparities,
+)
 
 FloatArray = NDArray[np.float64]
 Photograph = NDArray[np.uint8]
@@ -67,9 +71,9 @@ def match(
     """Disparities of the left and of the right photograph of a rectified pair.
 
     left, right: (h, w, 3) sRGB, whose exposures may differ; most: the largest disparity looked for,
-    pixels. What only one of the two sees has none: ``depth_refinement.filled`` makes one up.
-    fine: match at twice the width. Thin things stay, fractions of a pixel are better, and it takes
-    three times as long. Raises ValueError for photographs of different sizes.
+    pixels. What only one of the two sees has none: ``fill_disparity_holes`` makes one up. fine:
+    match at twice the width. Thin things stay, fractions of a pixel are better, and it takes three
+    times as long. Raises ValueError for photographs of different sizes.
     """
     if left.shape != right.shape or left.ndim != 3:
         raise ValueError(
@@ -82,7 +86,9 @@ def match(
     for one, (photograph, side, sign) in zip(found, ways, strict=True):
         partner = rectified_partner(greys[1 - side].astype(np.float32), sign)
         grey = greys[side].astype(np.float32)
-        disparity, _ = refined(one.disparity, np.ascontiguousarray(photograph), grey, [partner])
+        disparity, _ = refine_disparities(
+            one.disparity, np.ascontiguousarray(photograph), grey, [partner]
+        )
         answer.append(DisparityMap(disparity, one.confidence))
     return answer[0], answer[1]
 
@@ -209,7 +215,7 @@ def depth_maps(
             for other, grey in enumerate(greys)
             if other != camera
         ]
-        disparity, told = refined(
+        disparity, told = refine_disparities(
             one.value * np.float32(unit),
             np.ascontiguousarray(photographs[camera]),
             greys[camera].astype(np.float32),

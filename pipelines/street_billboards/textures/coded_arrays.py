@@ -31,17 +31,17 @@ class CodedArrays(NamedTuple):
     weights: tuple[Bytes, Bytes, Bytes]
 
 
-def starts(counts: NDArray[np.integer]) -> Ints:
+def offsets(counts: NDArray[np.integer]) -> Ints:
     """(b + 1,): where each of groups of so many (b,) begins."""
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)])
 
 
-def blank(ranks: Bytes, views: Ints, sides: Ints) -> CodedArrays:
+def grey_arrays(ranks: Bytes, views: Ints, sides: Ints) -> CodedArrays:
     """Arrays that stand for grey: ranks (b, 3), views (b,) of each billboard, sides (3,)."""
     many = ranks.astype(np.int64)
-    first_plane = (starts(many[:, 0]), starts(many[:, 1]), starts(many[:, 2]))
+    first_plane = (offsets(many[:, 0]), offsets(many[:, 1]), offsets(many[:, 2]))
     each = many * views[:, None]
-    first_weight = (starts(each[:, 0]), starts(each[:, 1]), starts(each[:, 2]))
+    first_weight = (offsets(each[:, 0]), offsets(each[:, 1]), offsets(each[:, 2]))
 
     def grey(*shape: int) -> Bytes:
         return np.full(shape, 128, np.uint8)

@@ -13,8 +13,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.coded_arrays import starts
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.coded_arrays import offsets
+from pipelines.street_billboards.textures.forms import (
+    SEEN,
+    SIDE,
+    CompressedTextures,
+    ViewTextures,
+)
 from pipelines.street_billboards.textures.plane_resolution import sample_places
 
 Planes = tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]
@@ -42,12 +47,21 @@ class Decodable(NamedTuple):
     masks: NDArray[np.uint8]
 
 
+class ViewPair(NamedTuple):
+    """The two stored views between which a viewer stands, counted from the billboard's first."""
+
+    lower: int
+    upper: int
+    fraction: float
+    """Share of the upper one."""
+
+
 def decodable(textures: CompressedTextures) -> Decodable:
     """What the kernels read; make it once for many frames."""
     views = np.diff(textures.first)
     ranks = textures.ranks.astype(np.int64)
-    planes = [starts(ranks[:, c]) for c in range(3)]
-    weights = [starts(ranks[:, c] * views) for c in range(3)]
+    planes = [offsets(ranks[:, c]) for c in range(3)]
+    weights = [offsets(ranks[:, c] * views) for c in range(3)]
     return Decodable(
         textures.colour == "ycocg",
         textures.first,
@@ -82,24 +96,24 @@ def decoded_views(
 
 
 @njit(cache=True, nogil=True)
-def view_pair(direction: NDArray[np.uint8], position: float) -> tuple[int, int, float]:
-    """The two views (rows of direction, (n,) rising) around a place in the fan, and the share of
-    the second, (position - lower) / (upper - lower); the first or last one alone beyond the ends.
+def view_pair(direction: NDArray[np.uint8], position: float) -> ViewPair:
+    """The views around a place in the fan; directions (n,) rise. Beyond the ends, one view twice.
+
+    fraction: (position - lower direction) / (upper - lower direction).
     """
-    last = len(direction) - 1
+    lower, last = 0, len(direction) - 1
     if position <= direction[0]:
-        return 0, 0, 0.0
+        return ViewPair(lower, lower, 0.0)
     if position >= direction[last]:
-        return last, last, 0.0
-    lower = 0
+        return ViewPair(last, last, 0.0)
     while direction[lower + 1] <= position:
         lower += 1
     begin, end = float(direction[lower]), float(direction[lower + 1])
-    return lower, lower + 1, (position - begin) / (end - begin)
+    return ViewPair(lower, lower + 1, (position - begin) / (end - begin))
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _channel(
+def _add_planes(
     planes: NDArray[np.uint8],
     scales: NDArray[np.float32],
     lower: NDArray[np.uint8],
@@ -134,19 +148,12 @@ def _channel(
 
 @njit(cache=True, nogil=True)
 def decode_colours(
-    data: Decodable,
-    billboard: int,
-    lower: int,
-    upper: int,
-    fraction: float,
-    out: NDArray[np.float32],
+    data: Decodable, billboard: int, pair: ViewPair, out: NDArray[np.float32]
 ) -> None:
     """Colours between two views of a billboard into ``out`` (3, 32, 32), codes, clamped."""
-    begin = data.first[billboard]
-    views = data.first[billboard + 1] - begin
-    _one_channel(data, 0, billboard, begin, views, lower, upper, fraction, out)
-    _one_channel(data, 1, billboard, begin, views, lower, upper, fraction, out)
-    _one_channel(data, 2, billboard, begin, views, lower, upper, fraction, out)
+    _decode_channel(data, 0, billboard, pair, out[0])
+    _decode_channel(data, 1, billboard, pair, out[1])
+    _decode_channel(data, 2, billboard, pair, out[2])
     for y in range(SIDE):
         for x in range(SIDE):
             red, green, blue = out[0, y, x], out[1, y, x], out[2, y, x]
@@ -159,32 +166,25 @@ def decode_colours(
 
 
 @njit(cache=True, nogil=True)
-def _one_channel(
-    data: Decodable,
-    channel: int,
-    billboard: int,
-    begin: int,
-    views: int,
-    lower: int,
-    upper: int,
-    fraction: float,
-    out: NDArray[np.float32],
+def _decode_channel(
+    data: Decodable, channel: int, billboard: int, pair: ViewPair, out: NDArray[np.float32]
 ) -> None:
     rank = np.int64(data.ranks[billboard, channel])
     plane = data.first_plane[channel][billboard]
-    start = data.first_weight[channel][billboard]
-    weights = data.weights[channel]
-    mean = (1.0 - fraction) * data.means[begin + lower, channel] + fraction * data.means[
-        begin + upper, channel
-    ]
-    _channel(
-        data.planes[channel][plane : plane + rank],
-        data.scales[channel][plane : plane + rank],
-        weights[start + lower * rank : start + (lower + 1) * rank],
-        weights[start + upper * rank : start + (upper + 1) * rank],
-        fraction,
+    planes = slice(plane, plane + rank)
+    lower = data.first_weight[channel][billboard] + pair.lower * rank
+    upper = data.first_weight[channel][billboard] + pair.upper * rank
+    weights, first = data.weights[channel], data.first[billboard]
+    mean = (1.0 - pair.fraction) * data.means[first + pair.lower, channel]
+    mean += pair.fraction * data.means[first + pair.upper, channel]
+    _add_planes(
+        data.planes[channel][planes],
+        data.scales[channel][planes],
+        weights[lower : lower + rank],
+        weights[upper : upper + rank],
+        pair.fraction,
         mean,
-        out[channel],
+        out,
     )
 
 
@@ -202,53 +202,42 @@ def _decode_many(
         if begin == end:
             out[j] = 0
             continue
-        lower, upper, fraction = view_pair(data.direction[begin:end], position[j])
-        decode_colours(data, b, lower, upper, fraction, colours)
+        pair = view_pair(data.direction[begin:end], position[j])
+        decode_colours(data, b, pair, colours)
         mask = data.first_mask[b]
         each = data.first_mask[b + 1] - mask > 1
-        one = data.masks[mask + (lower if each else 0)]
-        other = data.masks[mask + (upper if each else 0)]
+        one = data.masks[mask + (pair.lower if each else 0)]
+        other = data.masks[mask + (pair.upper if each else 0)]
         # One half is opaque: the upper view decides from the middle on.
-        nearer = other if fraction > 0.5 else one
+        nearer = other if pair.fraction > 0.5 else one
         for y in range(SIDE):
             for x in range(SIDE):
                 for c in range(3):
                     out[j, y, x, c] = np.uint8(colours[c, y, x] + np.float32(0.5))
                 bit = 128 >> (x & 7)
                 opaque = (nearer[y, x >> 3] & bit) != 0
-                if fraction == 0.5:
+                if pair.fraction == 0.5:
                     opaque = opaque or (other[y, x >> 3] & bit) != 0
                 out[j, y, x, 3] = 255 if opaque else 0
 
 
 @njit(cache=True, nogil=True)
-def seen_errors(
-    data: Decodable,
-    first: NDArray[np.int64],
-    direction: NDArray[np.uint8],
-    colours: NDArray[np.uint8],
-    states: NDArray[np.uint8],
-    seen: int,
-    total: NDArray[np.float64],
-    count: NDArray[np.int64],
-) -> None:
-    """Sums of squares of errors of rounded colours where states are ``seen``, by billboard.
+def seen_errors(data: Decodable, views: ViewTextures, total: NDArray[np.float64]) -> None:
+    """Sums of squares of errors of rounded colours of SEEN texels, into ``total`` (b,).
 
-    first, direction, colours, states are of ViewTextures; total and count (b,) are written, count
-    in channels of texels. Views are found by their direction.
+    Views are found by their direction.
     """
     buffer = np.empty((3, SIDE, SIDE), np.float32)
     for b in range(len(total)):
-        total[b], count[b] = 0.0, 0
-        for i in range(first[b], first[b + 1]):
+        total[b] = 0.0
+        for i in range(views.first[b], views.first[b + 1]):
             begin, end = data.first[b], data.first[b + 1]
-            lower, upper, fraction = view_pair(data.direction[begin:end], float(direction[i]))
-            decode_colours(data, b, lower, upper, fraction, buffer)
+            pair = view_pair(data.direction[begin:end], float(views.direction[i]))
+            decode_colours(data, b, pair, buffer)
             for y in range(SIDE):
                 for x in range(SIDE):
-                    if states[i, y, x] == seen:
+                    if views.states[i, y, x] == SEEN:
                         for c in range(3):
                             code = np.int64(buffer[c, y, x] + np.float32(0.5))
-                            off = code - np.int64(colours[i, y, x, c])
+                            off = code - np.int64(views.colours[i, y, x, c])
                             total[b] += off * off
-                        count[b] += 3

@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 from pipelines.street_billboards.textures.coded_arrays import CodedArrays
 from pipelines.street_billboards.textures.forms import SEEN, SIDE
 from pipelines.street_billboards.textures.low_rank_fit import (
+    Factors,
     FloatArray,
-    refined,
+    alternate_least_squares,
     solve_weights,
     squared_error,
-    started,
+    truncated_svd,
 )
 from pipelines.street_billboards.textures.plane_resolution import (
-    enlarged,
+    downsampled,
     fill_unknown,
-    reduced,
     sharpen,
+    upsampled,
 )
 
 Bytes = NDArray[np.uint8]
@@ -40,7 +41,7 @@ _SHARPENING = 6
 _MEAN_SWEEPS = 2
 
 
-class Sampled(NamedTuple):
+class ViewsToFit(NamedTuple):
     """What kernels read of ViewTextures, and how they are to look at it."""
 
     first: Ints
@@ -54,7 +55,7 @@ class Sampled(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def channels_of(colours: Bytes, luma_chroma: bool) -> FloatArray:
+def colour_channels(colours: Bytes, luma_chroma: bool) -> FloatArray:
     """Channels (3, n, 1024) of textures (n, 32, 32, 3), in codes; 128 is added to Co and Cg."""
     views = len(colours)
     result = np.empty((3, views, SIDE * SIDE), np.float32)
@@ -76,7 +77,7 @@ def channels_of(colours: Bytes, luma_chroma: bool) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)
-def counted_of(states: Bytes, view_weights: FloatArray) -> FloatArray:
+def texel_weights(states: Bytes, view_weights: FloatArray) -> FloatArray:
     """How much each texel (n, 1024) counts: its view's weight where it was SEEN."""
     views = len(states)
     result = np.zeros((views, SIDE * SIDE), np.float32)
@@ -110,49 +111,47 @@ def guess_gaps(channels: FloatArray, counted: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True)
+def start_planes(values: FloatArray, counted: FloatArray, most: int, side: int) -> Factors:
+    """The start of every fit, of ``most`` components, images in the planes' resolution."""
+    if side == SIDE:
+        return truncated_svd(values, counted, most)
+    small, mass = downsampled(values, counted, side)
+    return truncated_svd(small, mass, most)
+
+
+@njit(cache=True, nogil=True)
 def fit_planes(
     values: FloatArray,
     counted: FloatArray,
-    start: tuple[FloatArray, FloatArray, FloatArray],
+    start: Factors,
     rank: int,
     side: int,
     ridge: float,
     sweeps: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Means (n,), weights (n, rank), planes (rank, side²) and the sum of squares that they leave.
+) -> tuple[Factors, float]:
+    """The fit of so many components, images (rank, side²), and the sum of squares that it leaves.
 
-    ``start``: of ``rank`` components or more, in the planes' resolution, by `first_planes`.
+    values, counted (n, 1024); start: of ``rank`` components or more, by `start_planes`.
     """
-    means = start[0].copy()
-    weights = start[1][:, :rank].copy()
-    planes = start[2][:rank].copy()
+    factors = Factors(
+        start.means.copy(), start.weights[:, :rank].copy(), start.images[:rank].copy()
+    )
     if side == SIDE:
-        refined(values, counted, means, weights, planes, ridge, sweeps)
+        alternate_least_squares(values, counted, factors, ridge, sweeps)
         if rank == 0:
-            solve_weights(values, counted, means, weights, planes, True)
-        return means, weights, planes, squared_error(values, counted, means, weights, planes)
-    small, mass = reduced(values, counted, side)
-    refined(small, mass, means, weights, planes, ridge, sweeps)
-    sharpen(values, counted, means, weights, planes, side, _SHARPENING)
-    large = enlarged(planes, side)
-    solve_weights(values, counted, means, weights, large, True)
-    return means, weights, planes, squared_error(values, counted, means, weights, large)
-
-
-@njit(cache=True, nogil=True)
-def first_planes(
-    values: FloatArray, counted: FloatArray, most: int, side: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The start of every fit, of ``most`` components."""
-    if side == SIDE:
-        return started(values, counted, most)
-    small, mass = reduced(values, counted, side)
-    return started(small, mass, most)
+            solve_weights(values, counted, factors, True)
+        return factors, squared_error(values, counted, factors)
+    small, mass = downsampled(values, counted, side)
+    alternate_least_squares(small, mass, factors, ridge, sweeps)
+    sharpen(values, counted, factors, side, _SHARPENING)
+    large = Factors(factors.means, factors.weights, upsampled(factors.images, side))
+    solve_weights(values, counted, large, True)
+    return factors, squared_error(values, counted, large)
 
 
 @njit(cache=True, nogil=True)
 def rank_errors(
-    data: Sampled,
+    data: ViewsToFit,
     most: Ints,
     enough: float,
     ridge: float,
@@ -167,7 +166,7 @@ def rank_errors(
     errors[:] = np.inf
     for b in range(len(errors)):
         begin, end = data.first[b], data.first[b + 1]
-        counted = counted_of(data.states[begin:end], data.view_weights[begin:end])
+        counted = texel_weights(data.states[begin:end], data.view_weights[begin:end])
         mass = counted.sum()
         if mass <= 0.0:
             errors[b, :, 0] = 0.0
@@ -175,38 +174,41 @@ def rank_errors(
         known = 0
         for i in range(end - begin):
             known += (counted[i] > 0.0).any()
-        channels = channels_of(data.colours[begin:end], data.luma_chroma)
+        channels = colour_channels(data.colours[begin:end], data.luma_chroma)
         guess_gaps(channels, counted)
         for c in range(3):
             limit = min(known, most[c])
-            start = first_planes(channels[c], counted, limit, data.sides[c])
+            start = start_planes(channels[c], counted, limit, data.sides[c])
             for rank in range(limit + 1):
                 errors[b, c, rank] = fit_planes(
                     channels[c], counted, start, rank, data.sides[c], ridge, sweeps
-                )[3]
+                )[1]
                 if errors[b, c, rank] <= enough * mass:
                     break
 
 
-@njit(cache=True, nogil=True)
-def code_planes(
-    values: FloatArray,
-    counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    planes: FloatArray,
-    side: int,
-    mean_codes: Bytes,
-    plane_codes: Bytes,
-    scales: FloatArray,
-    weight_codes: Bytes,
-) -> None:
-    """8 bit codes of one channel of a billboard; means and weights are fitted anew to coded planes.
+class ChannelCodes(NamedTuple):
+    """Where 8 bit codes of one channel of a billboard are written."""
 
-    values, counted (n, 1024); means (n,), weights (n, r), planes (r, side²); into mean_codes (n,),
-    plane_codes (r, side²), scales (r,), weight_codes (n * r,). What is decoded of weights and
-    planes is left in ``means``, ``weights`` and ``planes``.
+    means: Bytes
+    """(n,)."""
+    planes: Bytes
+    """(r, side²)."""
+    scales: FloatArray
+    """(r,)."""
+    weights: Bytes
+    """(n * r,), view by view."""
+
+
+@njit(cache=True, nogil=True)
+def code_channel(
+    values: FloatArray, counted: FloatArray, factors: Factors, side: int, codes: ChannelCodes
+) -> None:
+    """8 bit codes of a fit, images (r, side²); means and weights are fitted anew to coded planes.
+
+    values, counted (n, 1024). What is decoded of the codes is left in ``factors``.
     """
+    means, weights, planes = factors
     views, rank = weights.shape
     for k in range(rank):
         largest = np.float32(0.0)
@@ -214,29 +216,29 @@ def code_planes(
             largest = max(largest, abs(value))
         for q in range(planes.shape[1]):
             code = np.rint(planes[k, q] / largest * 127.0) if largest > 0.0 else 0.0
-            plane_codes[k, q] = np.uint8(code + 128.0)
+            codes.planes[k, q] = np.uint8(code + 128.0)
             planes[k, q] = np.float32(code / 127.0)
-    large = enlarged(planes, side)
+    large = Factors(means, weights, upsampled(planes, side))
     for _ in range(_MEAN_SWEEPS):
-        solve_weights(values, counted, means, weights, large, True)
+        solve_weights(values, counted, large, True)
     for i in range(views):
-        mean_codes[i] = np.uint8(min(max(np.rint(means[i]), 0.0), 255.0))
-        means[i] = mean_codes[i]
-    solve_weights(values, counted, means, weights, large, False)
+        codes.means[i] = np.uint8(min(max(np.rint(means[i]), 0.0), 255.0))
+        means[i] = codes.means[i]
+    solve_weights(values, counted, large, False)
     for k in range(rank):
         largest = np.float32(0.0)
         for i in range(views):
             largest = max(largest, abs(weights[i, k]))
-        scales[k] = largest
+        codes.scales[k] = largest
         for i in range(views):
             code = np.rint(weights[i, k] / largest * 127.0) if largest > 0.0 else 0.0
-            weight_codes[i * rank + k] = np.uint8(code + 128.0)
+            codes.weights[i * rank + k] = np.uint8(code + 128.0)
             weights[i, k] = np.float32(code / 127.0) * largest
 
 
 @njit(cache=True, nogil=True)
 def code_billboards(
-    data: Sampled, arrays: CodedArrays, begin_at: int, end_at: int, ridge: float, sweeps: int
+    data: ViewsToFit, arrays: CodedArrays, begin_at: int, end_at: int, ridge: float, sweeps: int
 ) -> None:
     """Fit and code billboards ``begin_at`` to ``end_at``, of the ranks that ``arrays`` have."""
     sides = data.sides
@@ -244,37 +246,37 @@ def code_billboards(
         begin, end = data.first[b], data.first[b + 1]
         if begin == end:
             continue
-        counted = counted_of(data.states[begin:end], data.view_weights[begin:end])
-        channels = channels_of(data.colours[begin:end], data.luma_chroma)
+        counted = texel_weights(data.states[begin:end], data.view_weights[begin:end])
+        channels = colour_channels(data.colours[begin:end], data.luma_chroma)
         guess_gaps(channels, counted)
         for c in (2, 1, 0):
             rank = int(arrays.ranks[b, c])
-            start = first_planes(channels[c], counted, rank, sides[c])
-            middle, amounts, images, _ = fit_planes(
-                channels[c], counted, start, rank, sides[c], ridge, sweeps
-            )
-            if sides[c] == SIDE:
-                fill_unknown(images, counted, SIDE)
-            else:
-                fill_unknown(images, reduced(channels[c], counted, sides[c])[1], sides[c])
+            start = start_planes(channels[c], counted, rank, sides[c])
+            factors, _ = fit_planes(channels[c], counted, start, rank, sides[c], ridge, sweeps)
+            mass = counted
+            if sides[c] != SIDE:
+                mass = downsampled(channels[c], counted, sides[c])[1]
+            fill_unknown(factors.images, mass, sides[c])
             plane, weight = arrays.first_plane[c][b], arrays.first_weight[c][b]
-            code_planes(
-                channels[c],
-                counted,
-                middle,
-                amounts,
-                images,
-                sides[c],
+            codes = ChannelCodes(
                 arrays.means[begin:end, c],
                 arrays.planes[c][plane : plane + rank],
                 arrays.scales[c][plane : plane + rank],
                 arrays.weights[c][weight : weight + rank * (end - begin)],
             )
+            code_channel(channels[c], counted, factors, sides[c], codes)
             if c == 2 and data.luma_chroma:
-                large = enlarged(images, sides[c])
-                for i in range(end - begin):
-                    for p in range(SIDE * SIDE):
-                        decoded = middle[i]
-                        for k in range(rank):
-                            decoded += amounts[i, k] * large[k, p]
-                        channels[0, i, p] += (decoded - channels[2, i, p]) / np.float32(3.0)
+                _cancel_green_error(channels, factors, sides[c])
+
+
+@njit(cache=True, nogil=True)
+def _cancel_green_error(channels: FloatArray, coded: Factors, side: int) -> None:
+    """Change luma, in place, by a third of what the coded Cg is off."""
+    means, weights, _ = coded
+    large = upsampled(coded.images, side)
+    for i in range(len(means)):
+        for p in range(SIDE * SIDE):
+            decoded = means[i]
+            for k in range(weights.shape[1]):
+                decoded += weights[i, k] * large[k, p]
+            channels[0, i, p] += (decoded - channels[2, i, p]) / np.float32(3.0)

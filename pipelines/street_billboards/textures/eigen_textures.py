@@ -18,11 +18,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.coded_arrays import CodedArrays, as_textures, blank
+from pipelines.street_billboards.textures.coded_arrays import CodedArrays, as_textures, grey_arrays
 from pipelines.street_billboards.textures.decoding import decodable, seen_errors
 from pipelines.street_billboards.textures.eigen_kernels import (
     LUMA_CHROMA_WEIGHTS,
-    Sampled,
+    ViewsToFit,
     code_billboards,
     rank_errors,
 )
@@ -114,9 +114,9 @@ def _sampled(
     weights: NDArray[np.float32],
     luma_chroma: bool,
     sides: NDArray[np.int64],
-) -> Sampled:
+) -> ViewsToFit:
     first = views.first.astype(np.int64)
-    return Sampled(first, views.colours, views.states, weights, luma_chroma, sides)
+    return ViewsToFit(first, views.colours, views.states, weights, luma_chroma, sides)
 
 
 def compressed_paper(
@@ -154,7 +154,7 @@ def compressed_paper(
         if rank is not None:
             ranks = np.minimum(ranks, np.uint8(rank))
     sides = np.full(3, SIDE)
-    arrays = blank(ranks, np.full(count, DIRECTIONS), sides)
+    arrays = grey_arrays(ranks, np.full(count, DIRECTIONS), sides)
     code_paper(data[0], data[1], data[2], data[3], nearest, arrays)
     first_mask, masks = masks_of_directions(views, turns, nearest)
     return as_textures(
@@ -176,7 +176,7 @@ def _in_parts(work: Callable[[slice], None], count: int) -> None:
         list(pool.map(work, [slice(a, b) for a, b in itertools.pairwise(edges)]))
 
 
-def _rank_errors(data: Sampled, most: NDArray[np.int64], enough: float) -> NDArray[np.float64]:
+def _rank_errors(data: ViewsToFit, most: NDArray[np.int64], enough: float) -> NDArray[np.float64]:
     """(b, 3, most + 1) sums of squares that ranks would leave, infinity where there is none."""
     errors = np.empty((len(data.first) - 1, 3, int(most.max()) + 1))
 
@@ -188,9 +188,9 @@ def _rank_errors(data: Sampled, most: NDArray[np.int64], enough: float) -> NDArr
     return errors
 
 
-def _coded(data: Sampled, ranks: NDArray[np.uint8]) -> CodedArrays:
+def _coded(data: ViewsToFit, ranks: NDArray[np.uint8]) -> CodedArrays:
     """Everything fitted and coded with these ranks (b, 3)."""
-    arrays = blank(ranks, np.diff(data.first), data.sides)
+    arrays = grey_arrays(ranks, np.diff(data.first), data.sides)
 
     def work(part: slice) -> None:
         code_billboards(data, arrays, part.start, part.stop, RIDGE, _SWEEPS)
@@ -282,14 +282,5 @@ def decode_error(views: ViewTextures, textures: CompressedTextures) -> tuple[flo
 def _squared_errors(views: ViewTextures, textures: CompressedTextures) -> NDArray[np.float64]:
     """(b,) sums over SEEN texels and R, G, B."""
     total = np.zeros(len(views.first) - 1)
-    seen_errors(
-        decodable(textures),
-        views.first,
-        views.direction,
-        views.colours,
-        views.states,
-        SEEN,
-        total,
-        np.zeros(len(total), np.int64),
-    )
+    seen_errors(decodable(textures), views, total)
     return total

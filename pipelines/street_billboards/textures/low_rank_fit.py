@@ -16,6 +16,8 @@ and a thousand texels.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -28,7 +30,18 @@ _PULL = 0.5
 _START_SWEEPS = 3
 
 
-def fitted(
+class Factors(NamedTuple):
+    """A fit of r components to n views of P texels: means[:, None] + weights @ images; float32."""
+
+    means: FloatArray
+    """(n,)."""
+    weights: FloatArray
+    """(n, r)."""
+    images: FloatArray
+    """(r, P)."""
+
+
+def fit_low_rank(
     values: FloatArray,
     seen: NDArray[np.bool_],
     rank: int,
@@ -36,8 +49,8 @@ def fitted(
     view_weights: NDArray[np.floating] | None = None,
     ridge: float = RIDGE,
     sweeps: int = 30,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means (n,), weights (n, rank) and images (rank, P) that are nearest to what was seen.
+) -> Factors:
+    """Means, weights and images that are nearest to what was seen.
 
     values (n, P): views' texels in codes; seen (n, P); rank: 0 up to the number of views that saw
     anything; view_weights (n,): how much an error in each view counts, 1 unless given; sweeps: of
@@ -55,16 +68,14 @@ def fitted(
     if view_weights is not None:
         counted *= np.asarray(view_weights, np.float32)[:, None]
     data = np.ascontiguousarray(values, np.float32)
-    means, weights, images = started(data, counted, rank)
-    refined(data, counted, means, weights, images, ridge, sweeps)
-    return means, weights, images
+    factors = truncated_svd(data, counted, rank)
+    alternate_least_squares(data, counted, factors, ridge, sweeps)
+    return factors
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def started(
-    values: FloatArray, counted: FloatArray, rank: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The truncated SVD, gaps filled with the mean of the other views: means, weights, images.
+def truncated_svd(values: FloatArray, counted: FloatArray, rank: int) -> Factors:
+    """The truncated SVD, gaps filled with the mean of the other views.
 
     values, counted (n, P) float32: a texel counts by the second, 0 for unseen.
     """
@@ -113,7 +124,7 @@ def started(
             if total[p] <= 0.0:
                 images[k, p] = 0.0
         _normalise(images[k], weights[:, k])
-    return means, weights, images
+    return Factors(means, weights, images)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -159,44 +170,42 @@ def _normalise(image: FloatArray, weights: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def refined(
+def alternate_least_squares(
     values: FloatArray,
     counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    images: FloatArray,
+    factors: Factors,
     ridge: float,
     sweeps: int,
 ) -> None:
     """Alternating least squares over what counts, in place; then images are made orthogonal.
 
-    values, counted (n, P); means (n,), weights (n, r), images (r, P) as `started` leaves them, all
-    float32. Does nothing where every texel counts alike: then the start is the answer.
+    values, counted (n, P); factors as `truncated_svd` leaves them. Does nothing where every texel
+    counts alike: then the start is the answer.
     """
+    _, weights, images = factors
     rank = len(images)
     if rank == 0 or (counted == counted[0, 0]).all():
         return
     for _ in range(sweeps):
-        solve_images(values, counted, means, weights, images, ridge)
+        solve_images(values, counted, factors, ridge)
         for k in range(rank):
             _normalise(images[k], weights[:, k])
-        solve_weights(values, counted, means, weights, images, True)
-    _orthogonalise(counted, means, weights, images)
+        solve_weights(values, counted, factors, True)
+    _orthogonalise(counted, factors)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def solve_images(
     values: FloatArray,
     counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    images: FloatArray,
+    factors: Factors,
     ridge: float,
 ) -> None:
-    """Least squares for ``images`` (r, P), in place, given means (n,) and weights (n, r).
+    """Least squares for the images, in place, given means and weights.
 
     A Cholesky decomposition at each texel, all texels side by side.
     """
+    means, weights, images = factors
     rank, texels = images.shape
     views = len(values)
     factor = np.zeros((rank, rank, texels), np.float32)
@@ -245,12 +254,11 @@ def solve_images(
 def solve_weights(
     values: FloatArray,
     counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    images: FloatArray,
+    factors: Factors,
     with_means: bool,
 ) -> None:
-    """Least squares for each view's weights (n, r) and, if asked for, means (n,), in place."""
+    """Least squares for each view's weights and, if asked for, means, in place."""
+    means, weights, images = factors
     rank, texels = images.shape
     views = len(values)
     if rank == 0:
@@ -308,10 +316,9 @@ def solve_weights(
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _orthogonalise(
-    counted: FloatArray, means: FloatArray, weights: FloatArray, images: FloatArray
-) -> None:
+def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
     """The same sum, with centred orthogonal images, the strongest first, in place."""
+    means, weights, images = factors
     rank, texels = images.shape
     views = len(weights)
     known = np.zeros(texels, np.float32)
@@ -354,11 +361,10 @@ def _orthogonalise(
 def squared_error(
     values: FloatArray,
     counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    images: FloatArray,
+    factors: Factors,
 ) -> float:
     """Sum over n views and P texels of ``counted`` times the error's square."""
+    means, weights, images = factors
     rank, texels = images.shape
     off = np.empty(texels, np.float32)
     total = 0.0

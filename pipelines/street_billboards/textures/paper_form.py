@@ -11,15 +11,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.coded_arrays import CodedArrays, starts
-from pipelines.street_billboards.textures.eigen_kernels import channels_of, code_planes, counted_of
+from pipelines.street_billboards.textures.coded_arrays import CodedArrays, offsets
+from pipelines.street_billboards.textures.eigen_kernels import (
+    ChannelCodes,
+    code_channel,
+    colour_channels,
+    texel_weights,
+)
 from pipelines.street_billboards.textures.forms import SIDE, ViewTextures
 from pipelines.street_billboards.textures.low_rank_fit import (
     RIDGE,
+    Factors,
     FloatArray,
+    alternate_least_squares,
     dot,
-    refined,
-    started,
+    truncated_svd,
 )
 from pipelines.street_billboards.textures.masks import masks_of
 from pipelines.street_billboards.textures.plane_resolution import fill_unknown
@@ -34,15 +40,18 @@ _SWEEPS = 10
 @njit(cache=True, nogil=True)
 def _components(
     values: FloatArray, counted: FloatArray, shares: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The filled matrix (n, 1024), its means (n,), weights (n, n), images (n, 1024) and the squares
-    of its singular values (n,), falling; view i stands for shares[i] rows."""
+) -> tuple[FloatArray, Factors, FloatArray]:
+    """The filled matrix (n, 1024), its SVD, and the squares of its singular values (n,), falling.
+
+    View i stands for shares[i] rows.
+    """
     views, texels = values.shape
     known = 0
     for i in range(views):
         known += (counted[i] > 0.0).any()
-    means, weights, images = started(values, counted, known)
-    refined(values, counted, means, weights, images, RIDGE, _SWEEPS)
+    factors = truncated_svd(values, counted, known)
+    alternate_least_squares(values, counted, factors, RIDGE, _SWEEPS)
+    means, weights, images = factors
     fill_unknown(images, counted, SIDE)
     filled = np.empty((views, texels), np.float32)
     for i in range(views):
@@ -75,7 +84,7 @@ def _components(
                 images[k] += np.float32(share * np.sqrt(shares[i] * texels / square)) * (
                     filled[i] - means[i]
                 )
-    return filled, means, weights, images, squares
+    return filled, Factors(means, weights, images), squares
 
 
 @njit(cache=True, nogil=True)
@@ -89,12 +98,12 @@ def paper_squares(
     """Squared singular values into ``squares`` (b, 3, 32); shares (v,): directions of each view."""
     for b in range(len(squares)):
         begin, end = first[b], first[b + 1]
-        counted = counted_of(states[begin:end], np.ones(end - begin, np.float32))
+        counted = texel_weights(states[begin:end], np.ones(end - begin, np.float32))
         if not (counted > 0.0).any():
             continue
-        channels = channels_of(colours[begin:end], False)
+        channels = colour_channels(colours[begin:end], False)
         for c in range(3):
-            squares[b, c, : end - begin] = _components(channels[c], counted, shares[begin:end])[4]
+            squares[b, c, : end - begin] = _components(channels[c], counted, shares[begin:end])[2]
 
 
 @njit(cache=True, nogil=True)
@@ -113,39 +122,33 @@ def code_paper(
     for b in range(len(nearest)):
         begin, end = first[b], first[b + 1]
         views = end - begin
-        counted = counted_of(states[begin:end], np.ones(views, np.float32))
+        counted = texel_weights(states[begin:end], np.ones(views, np.float32))
         if not (counted > 0.0).any():
             continue
-        channels = channels_of(colours[begin:end], False)
+        channels = colour_channels(colours[begin:end], False)
         everything = np.ones((views, SIDE * SIDE), np.float32)
         for c in range(3):
             rank = int(arrays.ranks[b, c])
-            filled, middle, amounts, images, squares = _components(
-                channels[c], counted, shares[begin:end]
-            )
+            filled, factors, squares = _components(channels[c], counted, shares[begin:end])
             kept = 0
             while kept < min(rank, views) and squares[kept] > 0.0:
                 kept += 1
             plane, weight = arrays.first_plane[c][b], arrays.first_weight[c][b]
-            mean_codes = np.empty(views, np.uint8)
-            weight_codes = np.empty(views * kept, np.uint8)
-            code_planes(
-                filled,
-                everything,
-                middle,
-                amounts[:, :kept].copy(),
-                images[:kept].copy(),
-                SIDE,
-                mean_codes,
+            codes = ChannelCodes(
+                np.empty(views, np.uint8),
                 arrays.planes[c][plane : plane + kept],
                 arrays.scales[c][plane : plane + kept],
-                weight_codes,
+                np.empty(views * kept, np.uint8),
             )
+            largest = Factors(
+                factors.means, factors.weights[:, :kept].copy(), factors.images[:kept].copy()
+            )
+            code_channel(filled, everything, largest, SIDE, codes)
             for d in range(nearest.shape[1]):
                 i = nearest[b, d] - begin
-                arrays.means[b * nearest.shape[1] + d, c] = mean_codes[i]
+                arrays.means[b * nearest.shape[1] + d, c] = codes.means[i]
                 place = weight + d * rank
-                arrays.weights[c][place : place + kept] = weight_codes[i * kept : (i + 1) * kept]
+                arrays.weights[c][place : place + kept] = codes.weights[i * kept : (i + 1) * kept]
 
 
 # ---- directions ------------------------------------------------------------------------------
@@ -180,7 +183,7 @@ def masks_of_directions(
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Masks of the observed views, for all 32 directions of what turns."""
     first, masks = masks_of(views, turns)
-    first_mask = starts(np.where(turns, DIRECTIONS, 1))
+    first_mask = offsets(np.where(turns, DIRECTIONS, 1))
     result = np.zeros((first_mask[-1], SIDE, SIDE // 8), np.uint8)
     result[first_mask[:-1][~turns]] = masks[first[:-1][~turns]]
     observed = turns & (np.diff(views.first) > 0)

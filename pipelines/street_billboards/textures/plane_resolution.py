@@ -1,4 +1,4 @@
-"""Eigen-images of fewer texels than the texture: how they are enlarged, and fitted.
+"""Eigen-images of fewer texels than the texture: how they are upsampled, and fitted.
 
 A plane of side s is sampled bilinearly at the middles of the texture's texels, clamped at the rim:
 texel y of 32 lies at (y + 0.5) / 32 * s - 0.5 of the plane.
@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.textures.forms import SIDE
+from pipelines.street_billboards.textures.low_rank_fit import Factors
 
 FloatArray = NDArray[np.float32]
 
@@ -33,7 +34,7 @@ def sample_places(side: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floa
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def enlarged(planes: FloatArray, side: int) -> FloatArray:
+def upsampled(planes: FloatArray, side: int) -> FloatArray:
     """Planes (r, side * side) as textures (r, 1024), float32."""
     count = len(planes)
     if side == SIDE:
@@ -54,8 +55,8 @@ def enlarged(planes: FloatArray, side: int) -> FloatArray:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def gathered(texture: FloatArray, side: int, plane: FloatArray) -> None:
-    """The transpose of ``enlarged``, for one texture (1024,), into ``plane`` (side * side,)."""
+def upsampled_transpose(texture: FloatArray, side: int, plane: FloatArray) -> None:
+    """The transpose of ``upsampled``, for one texture (1024,), into ``plane`` (side * side,)."""
     before, after, share = sample_places(side)
     plane[:] = 0.0
     for y in range(SIDE):
@@ -71,7 +72,9 @@ def gathered(texture: FloatArray, side: int, plane: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def reduced(values: FloatArray, counted: FloatArray, side: int) -> tuple[FloatArray, FloatArray]:
+def downsampled(
+    values: FloatArray, counted: FloatArray, side: int
+) -> tuple[FloatArray, FloatArray]:
     """Averages (n, side²) of views (n, 1024) over what counts in each cell, and how much counts."""
     views = len(values)
     cell = SIDE // side
@@ -94,18 +97,17 @@ def reduced(values: FloatArray, counted: FloatArray, side: int) -> tuple[FloatAr
 def sharpen(
     values: FloatArray,
     counted: FloatArray,
-    means: FloatArray,
-    weights: FloatArray,
-    planes: FloatArray,
+    factors: Factors,
     side: int,
     steps: int,
 ) -> None:
-    """Take planes (r, side * side), in place, towards those whose enlargement is nearest to views.
+    """Take images (r, side * side), in place, towards those that are nearest to views, upsampled.
 
-    values, counted (n, 1024), means (n,), weights (n, r). Averages of cells are too smooth once
-    they are interpolated. Steps of the gradient, each entry divided by the sum of what it and all
-    others do to the texels it touches, which can only lower the error.
+    values, counted (n, 1024). Averages of cells are too smooth once they are interpolated. Steps of
+    the gradient, each entry divided by the sum of what it and all others do to the texels it
+    touches, which can only lower the error.
     """
+    means, weights, planes = factors
     rank = len(planes)
     views, texels = values.shape
     step = np.zeros((rank, side * side), np.float32)
@@ -120,13 +122,13 @@ def sharpen(
             reach *= abs(weights[i, k])
             for p in range(texels):
                 total[p] += reach * counted[i, p]
-        gathered(total, side, plane)
+        upsampled_transpose(total, side, plane)
         for q in range(side * side):
             if plane[q] > 1e-3:
                 step[k, q] = 1.0 / plane[q]
     off = np.empty((views, texels), np.float32)
     for _ in range(steps):
-        large = enlarged(planes, side)
+        large = upsampled(planes, side)
         for i in range(views):
             for p in range(texels):
                 off[i, p] = values[i, p] - means[i]
@@ -142,7 +144,7 @@ def sharpen(
                 weight = weights[i, k]
                 for p in range(texels):
                     total[p] += weight * off[i, p]
-            gathered(total, side, plane)
+            upsampled_transpose(total, side, plane)
             for q in range(side * side):
                 planes[k, q] += step[k, q] * plane[q]
 

@@ -8,13 +8,13 @@ import pytest
 import skimage.data
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture.depth_refinement import filled
 from pipelines.street_billboards.capture.stereo import (
     DepthMaps,
     depth_maps,
     disparity_defaults,
     match,
 )
+from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
 from pipelines.street_billboards.figures import bad_pixel_share
 from tests.pipelines.street_billboards.stereo_street import Frame, frame_at
 
@@ -42,7 +42,7 @@ def test_a_real_pair_is_matched_better_than_by_opencv_as_it_comes(motorcycle: Pa
     found, _ = match(left, right, 64)
     defaults = bad_pixel_share(disparity_defaults(left, right, 64), truth)
     assert bad_pixel_share(found.disparity, truth) < 0.65 * defaults
-    assert bad_pixel_share(filled(found.disparity, left), truth) < 0.45 * defaults
+    assert bad_pixel_share(fill_disparity_holes(found.disparity, left), truth) < 0.45 * defaults
     known = np.isfinite(found.disparity)
     assert bad_pixel_share(found.disparity, np.where(known, truth, np.nan)) < 0.1
     assert ((found.confidence > 0) == known).all()
@@ -53,8 +53,8 @@ def test_half_the_width_is_coarser_and_not_bad(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
     fine, coarse = (match(left, right, 64, fine=way)[0].disparity for way in (True, False))
     assert (
-        bad_pixel_share(filled(fine, left), truth)
-        < bad_pixel_share(filled(coarse, left), truth)
+        bad_pixel_share(fill_disparity_holes(fine, left), truth)
+        < bad_pixel_share(fill_disparity_holes(coarse, left), truth)
         < 0.2
     )
 
@@ -103,11 +103,11 @@ def test_holes_take_the_far_side() -> None:
     disparity[:, 15:] = 9
     disparity[:, 10:15] = np.nan
     disparity[5] = np.nan
-    dense = filled(disparity, np.full((12, 30, 3), 90, np.uint8))
+    dense = fill_disparity_holes(disparity, np.full((12, 30, 3), 90, np.uint8))
     assert (dense[:, :14] == 3).all()
     assert (dense[:, 16:] == 9).all()
     assert np.isnan(
-        filled(np.full((4, 5), np.nan, np.float32), np.zeros((4, 5, 3), np.uint8))
+        fill_disparity_holes(np.full((4, 5), np.nan, np.float32), np.zeros((4, 5, 3), np.uint8))
     ).all()
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.textures.decoding import (
+    ViewPair,
     decodable,
     decode_colours,
     decoded_views,
@@ -54,7 +55,7 @@ def by_kernel(
     textures: CompressedTextures, billboard: int, lower: int, upper: int, fraction: float
 ) -> NDArray[np.float32]:
     out = np.empty((3, SIDE, SIDE), np.float32)
-    decode_colours(decodable(textures), billboard, lower, upper, fraction, out)
+    decode_colours(decodable(textures), billboard, ViewPair(lower, upper, fraction), out)
     return out.transpose(1, 2, 0)
 
 

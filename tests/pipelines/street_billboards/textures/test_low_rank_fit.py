@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.low_rank_fit import fitted
+from pipelines.street_billboards.textures.low_rank_fit import fit_low_rank
 
 Matrix = NDArray[np.float32]
 
@@ -22,7 +22,7 @@ def of_rank(views: int, rank: int, texels: int, seed: int = 0) -> Matrix:
 
 
 def squared_error(values: Matrix, seen: NDArray[np.bool_], rank: int) -> float:
-    means, weights, images = fitted(values, seen, rank)
+    means, weights, images = fit_low_rank(values, seen, rank)
     return float(((values - means[:, None] - weights @ images)[seen] ** 2).sum())
 
 
@@ -41,7 +41,7 @@ def test_without_gaps_it_is_the_truncated_svd(views: int, rank: int, seed: int) 
 def test_gaps_of_low_rank_data_are_recovered() -> None:
     values = of_rank(8, 2, 1024)
     seen = np.random.default_rng(1).random(values.shape) < 0.7
-    means, weights, images = fitted(values, seen, 2, ridge=1e-3, sweeps=100)
+    means, weights, images = fit_low_rank(values, seen, 2, ridge=1e-3, sweeps=100)
     off = values - means[:, None] - weights @ images
     # Where five views or more determine the two numbers of a texel.
     assert np.abs(off[:, seen.sum(axis=0) >= 5]).max() < 0.5
@@ -51,7 +51,7 @@ def test_gaps_of_low_rank_data_are_recovered() -> None:
 def test_filling_with_zeros_or_means_is_worse() -> None:
     values = of_rank(6, 1, 1024) + np.random.default_rng(2).normal(size=(6, 1024)).astype("f4")
     seen = np.random.default_rng(1).random(values.shape) < 0.6
-    means, weights, images = fitted(values, seen, 1)
+    means, weights, images = fit_low_rank(values, seen, 1)
     off = (values - means[:, None] - weights @ images)[~seen & seen.any(axis=0)]
     filled = np.where(seen, values, (values * seen).sum(1, keepdims=True) / seen.sum(1)[:, None])
     middle = filled.mean(axis=1, keepdims=True)
@@ -78,7 +78,7 @@ def test_images_are_orthogonal_centred_and_of_unit_size() -> None:
     values = of_rank(6, 3, 500)
     seen = np.random.default_rng(3).random(values.shape) < 0.8
     seen[:, :7] = False
-    _, weights, images = fitted(values, seen, 3)
+    _, weights, images = fit_low_rank(values, seen, 3)
     known = seen.any(axis=0)
     np.testing.assert_allclose(images @ images.T / 500, np.eye(3), atol=1e-3)
     np.testing.assert_allclose(images[:, known].mean(axis=1), 0.0, atol=1e-2)
@@ -90,7 +90,7 @@ def test_a_view_that_saw_nothing_looks_like_the_others() -> None:
     values = of_rank(1, 1, 400).repeat(5, axis=0)
     seen = np.ones(values.shape, np.bool_)
     seen[2] = False
-    means, weights, images = fitted(np.where(seen, values, 9e3).astype("f4"), seen, 1)
+    means, weights, images = fit_low_rank(np.where(seen, values, 9e3).astype("f4"), seen, 1)
     assert np.abs(means[2] + weights[2] @ images - values[0]).max() < 0.5
 
 
@@ -98,7 +98,7 @@ def test_views_count_by_their_weights() -> None:
     random = np.random.default_rng(0)
     values = random.uniform(0, 255, (4, 300)).astype(np.float32)
     seen = np.ones(values.shape, np.bool_)
-    means, weights, images = fitted(values, seen, 1, view_weights=np.array([100.0, 1, 1, 1]))
+    means, weights, images = fit_low_rank(values, seen, 1, view_weights=np.array([100.0, 1, 1, 1]))
     errors = ((values - means[:, None] - weights @ images) ** 2).mean(axis=1)
     assert errors[0] < 0.01 * errors[1:].min()
 
@@ -108,4 +108,4 @@ def test_ranks_that_do_not_exist_are_refused() -> None:
     seen = np.ones(values.shape, np.bool_)
     seen[1] = False
     with pytest.raises(ValueError, match="rank is 3; expected 0 to 2"):
-        fitted(values, seen, 3)
+        fit_low_rank(values, seen, 3)
