@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
-    image_blocks,
+    abrdf_clusters_dataset,
+    abrdf_matrix_dataset,
+    photograph_blocks,
 )
 from assets_defs.neural_btf.declaration import BTF, NONE
+from assets_defs.neural_btf.photographs import texels_and_photographs
 from assets_defs.settings import Settings
-from assets_defs.system import Metadata
+from assets_defs.sources import Source
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.neural_btf import figures
+from pipelines.neural_btf.abrdf import AbrdfSpace
+from pipelines.neural_btf.representatives import Representative
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
 
@@ -22,8 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 # ---- abrdf_matrix ----------------------------------------------------------------------------
 
@@ -32,40 +37,35 @@ class MatrixSettings(Settings):
     """What the clustering sees of the ABRDFs."""
 
     components: int = Field(32, ge=8, le=512, description="Principal components (unsaid in paper)")
-    space: Literal["log", "standardised", "linear"] = Field(
+    space: AbrdfSpace = Field(
         "log", description="Values of the principal components: x2, x3 or x1 (unsaid in the paper)"
     )
 
 
-def _explained(checked: StoredVersion) -> float:
-    dataset = checked.dataset
-    return float((dataset["singular_values"] ** 2).sum() / dataset["total_variation"])
-
-
-def _sampled(
-    checked: StoredVersion,
-) -> tuple[xr.Dataset, NDArray[np.int64], NDArray[np.floating]]:
-    """A few photographs, from the first to the last."""
+def _sampled_images(version: StoredVersion) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
+    """Numbers of a few photographs, from the first to the last, and the photographs."""
     import numpy as np
 
-    images = checked.input("btf_images")["images"]
+    images = version.input("btf_images")["images"]
     numbers = np.unique(np.linspace(0, len(images) - 1, 5).astype(int))
-    return checked.dataset, numbers, images[numbers].values
+    return numbers, images[numbers].values
 
 
-def _transposition_error(checked: StoredVersion) -> float:
-    from pipelines.neural_btf.figures import transposition_error
-
-    dataset, numbers, images = _sampled(checked)
-    return transposition_error(dataset["abrdfs"][:, numbers].values, images)
+def _transposition_error(version: StoredVersion) -> float:
+    numbers, images = _sampled_images(version)
+    return figures.transposition_error(version.dataset["abrdfs"][:, numbers].values, images)
 
 
-def _statistics_error(checked: StoredVersion) -> float:
-    from pipelines.neural_btf.figures import statistics_error
+def _statistics_error(version: StoredVersion) -> float:
+    numbers, images = _sampled_images(version)
+    mean, deviation = (version.dataset[name][numbers].values for name in ("mean", "deviation"))
+    return figures.statistics_error(mean, deviation, images)
 
-    dataset, numbers, images = _sampled(checked)
-    return statistics_error(
-        dataset["mean"][numbers].values, dataset["deviation"][numbers].values, images
+
+def _explained(version: StoredVersion) -> float:
+    dataset = version.dataset
+    return figures.explained_share(
+        dataset["singular_values"].values, float(dataset["total_variation"])
     )
 
 
@@ -96,49 +96,18 @@ def _statistics_error(checked: StoredVersion) -> float:
         ),
     ),
 )
-def abrdf_matrix(
-    settings: MatrixSettings, progress: Callable[[float], None], btf_images: xr.Dataset
-) -> Result:
+def abrdf_matrix(settings: MatrixSettings, progress: Progress, btf_images: xr.Dataset) -> Result:
     """Transpose photographs to ABRDFs, band by band; statistics and principal components."""
-    import numpy as np
-    import xarray as xr
+    from pipelines.neural_btf.principal_abrdfs import summarise_abrdfs
 
-    from pipelines.lowrank import principal_components
-    from pipelines.neural_btf import abrdf
-
-    images = btf_images["images"]
-    count, height, width, _ = images.shape
-    found = []
-    variation = 0.0
-    for block in image_blocks(images):
-        found.append(abrdf.statistics(block))
-        centred = abrdf.columns(block, settings.space)
-        centred -= centred.mean(axis=0)
-        variation += float(np.sum(centred.astype(np.float64) ** 2))
-        progress(0.3 * sum(len(part.mean) for part in found) / count)
-    rank = min(settings.components, height * width, 3 * count)
-    parts = principal_components(
-        lambda: (abrdf.columns(block, settings.space) for block in image_blocks(images)), rank
+    summary = summarise_abrdfs(
+        photograph_blocks(btf_images["images"]),
+        components=settings.components,
+        space=settings.space,
+        progress=progress,
     )
-    progress(0.9)
-    matrix = abrdf.texel_rows(images.data)
-    texels = max(1, (8 << 20) // (count * 3 * 2))
-    dataset = xr.Dataset(
-        {
-            "abrdfs": (("texel", "image", "channel"), matrix.rechunk({0: texels, 1: -1, 2: -1})),
-            "mean": (("image", "channel"), np.concatenate([part.mean for part in found])),
-            "deviation": (("image", "channel"), np.concatenate([part.deviation for part in found])),
-            "alpha": ((), max(float(part.largest.max()) for part in found)),
-            "scores": (("texel", "component"), parts.scores),
-            "singular_values": (("component",), parts.singular_values),
-            "total_variation": ((), variation),
-            "light": btf_images["light"],
-            "view": btf_images["view"],
-            "height": ((), np.int32(height)),
-            "width": ((), np.int32(width)),
-        }
-    )
-    return dataset, {"bytes raw, float32": count * height * width * 3 * 4}
+    dataset = abrdf_matrix_dataset(summary, btf_images)
+    return dataset, {"bytes raw, float32": btf_images["images"].size * 4}
 
 
 # ---- abrdf_clusters --------------------------------------------------------------------------
@@ -147,10 +116,24 @@ def abrdf_matrix(
 class ClusterSettings(Settings):
     """How texels are put together."""
 
-    representative: Literal["median", "mean", "medoid"] = Field(
+    representative: Representative = Field(
         "median", description="What stands for a cluster; the median is element-wise (our reading)"
     )
     cluster_seed: int = Field(0, ge=0, description="Seed of k-means++")
+
+
+@BTF.before_work
+def _check_clusters(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    """Refuse more clusters than texels before anything is made."""
+    if "clusters" not in sources or sources["clusters"].key == NONE:
+        return
+    material, clusters = sources["material"], int(sources["clusters"].key)
+    texels, _ = texels_and_photographs(material, settings["btf_images"])
+    if clusters > texels:
+        raise ValueError(
+            f"{material.name}: clusters is {clusters}; expected at most {texels}, the number of "
+            "texels."
+        )
 
 
 def _cluster_pictures(dataset: xr.Dataset) -> Pictures:
@@ -160,19 +143,14 @@ def _cluster_pictures(dataset: xr.Dataset) -> Pictures:
     return {"clusters": cluster_map(dataset["ids"].values, height, width)}
 
 
-def _smallest_cluster(checked: StoredVersion) -> float:
-    import numpy as np
-
-    dataset = checked.dataset
-    counted = np.bincount(dataset["ids"].values, minlength=dataset.sizes["cluster"])
-    return float(counted.min() if (counted == dataset["sizes"].values).all() else 0)
+def _smallest_cluster(version: StoredVersion) -> float:
+    dataset = version.dataset
+    return figures.smallest_cluster(dataset["ids"].values, dataset["sizes"].values)
 
 
-def _spread_ratio(checked: StoredVersion) -> float:
-    from pipelines.neural_btf.figures import spread_ratio
-
-    scores = checked.input("abrdf_matrix")["scores"].values
-    return spread_ratio(scores, checked.dataset["ids"].values)
+def _spread_ratio(version: StoredVersion) -> float:
+    scores = version.input("abrdf_matrix")["scores"].values
+    return figures.spread_ratio(scores, version.dataset["ids"].values)
 
 
 @BTF.asset(
@@ -200,52 +178,26 @@ def _spread_ratio(checked: StoredVersion) -> float:
 def abrdf_clusters(
     settings: ClusterSettings,
     keys: Mapping[str, str],
-    progress: Callable[[float], None],
+    progress: Progress,
     btf_images: xr.Dataset,
     abrdf_matrix: xr.Dataset,
 ) -> Result:
     """Cluster the ABRDFs by k-means++ on their principal components, and take representatives."""
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.clustering import k_means_plus_plus
-    from pipelines.neural_btf import representatives as standing
-    from pipelines.neural_btf.abrdf import transposed
-    from pipelines.neural_btf.training import warm_start
+    from pipelines.neural_btf.clusters import cluster_abrdfs, single_texel_clusters
 
     scores = abrdf_matrix["scores"].values
-    shape = {name: int(abrdf_matrix[name]) for name in ("height", "width")}
+    size = (int(abrdf_matrix["height"]), int(abrdf_matrix["width"]))
     if keys["clusters"] == NONE:
-        ids = np.arange(len(scores), dtype=np.int32)
-        variables = {
-            "ids": ("texel", ids),
-            "sizes": ("cluster", np.ones(len(scores), np.int64)),
-            "start": (("cluster", "latent"), warm_start(scores)),
+        return abrdf_clusters_dataset(single_texel_clusters(scores), size), {
+            "clusters": len(scores)
         }
-        return xr.Dataset(variables, attrs=shape), {"clusters": len(scores)}
-    clusters = int(keys["clusters"])
-    ids = k_means_plus_plus(scores, clusters, settings.cluster_seed)
-    progress(0.3)
-    order, starts = standing.members(ids, clusters)
-    centres = standing.cluster_means(scores, order, starts)
-    if settings.representative == "medoid":
-        chosen = standing.medoids(scores, order, starts)
-        values = abrdf_matrix["abrdfs"][chosen].values.astype(np.float32)
-    else:
-        of_block = {"median": standing.cluster_medians, "mean": standing.cluster_means}
-        summary = of_block[settings.representative]
-        parts = []
-        for block in image_blocks(btf_images["images"]):
-            columns = transposed(block.astype(np.float32))
-            reduced = summary(columns.reshape(len(columns), -1), order, starts)
-            parts.append(reduced.reshape(clusters, -1, 3))
-            progress(0.3 + 0.7 * sum(p.shape[1] for p in parts) / len(btf_images["images"]))
-        values = np.concatenate(parts, axis=1)
-    sizes = np.diff(starts)
-    variables = {
-        "ids": ("texel", ids),
-        "sizes": ("cluster", sizes),
-        "representatives": (("cluster", "image", "channel"), values),
-        "start": (("cluster", "latent"), warm_start(centres)),
-    }
-    return xr.Dataset(variables, attrs=shape), {"clusters": clusters, "largest": int(sizes.max())}
+    found = cluster_abrdfs(
+        photograph_blocks(btf_images["images"]),
+        scores,
+        int(keys["clusters"]),
+        representative=settings.representative,
+        seed=settings.cluster_seed,
+        progress=progress,
+    )
+    shown = {"clusters": len(found.sizes), "largest": int(found.sizes.max())}
+    return abrdf_clusters_dataset(found, size), shown

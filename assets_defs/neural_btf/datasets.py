@@ -1,51 +1,256 @@
-"""Datasets of this system as the types of `pipelines`."""
+"""Stored datasets of this system and the objects of `pipelines`, in both directions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pipelines.light.directions import Pairs
+from pipelines.neural_btf.abrdf import PhotographBlocks, check_values, transposed_view
+from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.decoder_arrays import DECODER_ARRAY_NAMES, DecoderArrays
+from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.light.directions import Pairs
-    from pipelines.neural_btf.compressed import CompressedBtf
+    from pipelines.neural_btf.clusters import AbrdfClusters
+    from pipelines.neural_btf.panel import Frames
+    from pipelines.neural_btf.principal_abrdfs import AbrdfSummary
+    from pipelines.neural_btf.restoration import RestorationErrors
+    from pipelines.neural_btf.training.trainer import TrainedNetwork
+
+_PIXELS = ("y", "x")
+_ABRDFS = ("texel", "image", "channel")
+_BAND_BYTES = 1 << 20
+_ABRDF_CHUNK_BYTES = 8 << 20
+
+
+# ---- photographs -----------------------------------------------------------------------------
+
+
+class LazyPhotographs(NamedTuple):
+    """Photographs of a material, measured or virtual; none is made before ``read``."""
+
+    pairs: Pairs
+    height: int
+    width: int
+    lights_per_view: int
+    read: Callable[[int, int], NDArray[np.float32]]
+    """Photographs first … last - 1, all of one view: (image, y, x, 3) linear RGB."""
+    about: dict[str, str]
+    """Where they come from, in words."""
+
+
+def btf_images_dataset(photographs: LazyPhotographs, name: str) -> xr.Dataset:
+    """`btf_images` of photographs that are read while they are stored."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "images": (("image", *_PIXELS, "channel"), _lazy_images(photographs)),
+            "light": (("image", "angle"), photographs.pairs.light),
+            "view": (("image", "angle"), photographs.pairs.view),
+        },
+        attrs={"name": name, **photographs.about},
+    )
+
+
+def _lazy_images(photographs: LazyPhotographs) -> Any:
+    """A lazy array (image, y, x, channel) float16, read a view at a time.
+
+    Its chunks are bands of rows of a view's photographs: the transposition to texels reads one
+    band of all views at a time, and no more.
+    """
+    import dask
+    import dask.array as da
+    import numpy as np
+
+    pairs, height, width, block, read, _ = photographs
+
+    def half(first: int, last: int) -> NDArray[np.float16]:
+        values = read(first, last)
+        check_values(values)
+        return values.astype(np.float16)
+
+    parts = []
+    for first in range(0, len(pairs.light), block):
+        last = min(first + block, len(pairs.light))
+        shape = (last - first, height, width, 3)
+        parts.append(da.from_delayed(dask.delayed(half)(first, last), shape, np.float16))
+    rows = -(-_BAND_BYTES // (block * width * 3 * 2))
+    return da.concatenate(parts).rechunk({1: min(rows, height)})
 
 
 def pairs_of(dataset: xr.Dataset) -> Pairs:
     """Light and view of a dataset's photographs."""
-    from pipelines.light.directions import Pairs
-
     return Pairs(dataset["light"].values, dataset["view"].values)
 
 
-def reader(array: xr.DataArray) -> Callable[[int, int], NDArray[np.floating]]:
-    """First to last - 1 of the first dimension, as they are wanted."""
-    return lambda first, last: array[first:last].values
-
-
-def image_blocks(images: xr.DataArray) -> Iterator[NDArray[np.float16]]:
+def photograph_blocks(images: xr.DataArray) -> PhotographBlocks:
     """Photographs a chunk at a time, all texels."""
-    start = 0
-    for count in images.chunks[0] if images.chunks else (len(images),):
-        yield images[start : start + count].values
-        start += count
+
+    def read() -> Iterator[NDArray[np.float16]]:
+        start = 0
+        for count in images.chunks[0] if images.chunks else (len(images),):
+            yield images[start : start + count].values
+            start += count
+
+    return PhotographBlocks(len(images), read)
 
 
-def compressed(dataset: xr.Dataset) -> CompressedBtf:
-    """The runtime BTF that a `compressed_btf` dataset holds."""
-    from pipelines.neural_btf.compressed import CompressedBtf
-    from pipelines.neural_btf.network import decoder_of
+# ---- ABRDFs and clusters ---------------------------------------------------------------------
 
-    arrays = {
-        str(name): dataset[name].values
-        for name in dataset
-        if str(name).startswith(("weight_", "bias_"))
+
+def abrdf_matrix_dataset(summary: AbrdfSummary, btf_images: xr.Dataset) -> xr.Dataset:
+    """`abrdf_matrix` of photographs, transposed while it is stored, and what is known of them."""
+    import numpy as np
+    import xarray as xr
+
+    images = btf_images["images"]
+    count, height, width, _ = images.shape
+    texels = max(1, _ABRDF_CHUNK_BYTES // (count * 3 * 2))
+    matrix = transposed_view(images.data).rechunk({0: texels, 1: -1, 2: -1})
+    return xr.Dataset(
+        {
+            "abrdfs": (_ABRDFS, matrix),
+            "mean": (("image", "channel"), summary.statistics.mean),
+            "deviation": (("image", "channel"), summary.statistics.deviation),
+            "alpha": ((), summary.alpha),
+            "scores": (("texel", "component"), summary.scores),
+            "singular_values": (("component",), summary.singular_values),
+            "total_variation": ((), summary.total_variation),
+            "light": btf_images["light"],
+            "view": btf_images["view"],
+            "height": ((), np.int32(height)),
+            "width": ((), np.int32(width)),
+        }
+    )
+
+
+def abrdf_reader(abrdf_matrix: xr.Dataset) -> Callable[[int, int], NDArray[np.floating]]:
+    """ABRDFs of texels first to last - 1, read as they are wanted."""
+    abrdfs = abrdf_matrix["abrdfs"]
+    return lambda first, last: abrdfs[first:last].values
+
+
+def abrdf_clusters_dataset(clusters: AbrdfClusters, size: tuple[int, int]) -> xr.Dataset:
+    """`abrdf_clusters` of photographs of ``size`` (rows, columns)."""
+    import xarray as xr
+
+    variables = {
+        "ids": ("texel", clusters.ids),
+        "sizes": ("cluster", clusters.sizes),
+        "start": (("cluster", "latent"), clusters.start),
     }
+    if clusters.representatives is not None:
+        variables["representatives"] = (("cluster", "image", "channel"), clusters.representatives)
+    return xr.Dataset(variables, attrs={"height": size[0], "width": size[1]})
+
+
+def abrdf_clusters_of(dataset: xr.Dataset) -> AbrdfClusters:
+    """The clusters that an `abrdf_clusters` dataset holds."""
+    from pipelines.neural_btf.clusters import AbrdfClusters
+
+    seen = dataset.get("representatives")
+    return AbrdfClusters(
+        dataset["ids"].values,
+        dataset["sizes"].values,
+        None if seen is None else seen.values,
+        dataset["start"].values,
+    )
+
+
+# ---- network ---------------------------------------------------------------------------------
+
+
+def neural_btf_dataset(trained: TrainedNetwork) -> xr.Dataset:
+    """`neural_btf` of a trained network."""
+    import xarray as xr
+
+    from pipelines.neural_btf.network import decoder_arrays, encoder_vector
+
+    variables = {
+        **_decoder_variables(decoder_arrays(trained.decoder)),
+        "latents": (("cluster", "latent"), trained.latents),
+        "encoder": ("parameter", encoder_vector(trained.encoder)),
+        "curve_step": ("point", trained.curve_step),
+        "curve_rmse": ("point", trained.curve_rmse),
+    }
+    if trained.encoder_residual is not None:
+        variables["encoder_residual"] = ((), trained.encoder_residual)
+    return xr.Dataset(variables, attrs={"widths": list(trained.encoder.widths)})
+
+
+def trained_network_of(dataset: xr.Dataset, images: int) -> TrainedNetwork:
+    """The network that a `neural_btf` dataset holds, trained on a number of photographs."""
+    from pipelines.neural_btf.network import decoder_of, encoder_of
+    from pipelines.neural_btf.training.trainer import TrainedNetwork
+
+    residual = dataset.get("encoder_residual")
+    return TrainedNetwork(
+        encoder_of(dataset["encoder"].values, images, dataset.attrs["widths"]),
+        decoder_of(decoder_arrays_of(dataset)),
+        dataset["latents"].values,
+        dataset["curve_step"].values,
+        dataset["curve_rmse"].values,
+        None if residual is None else float(residual),
+    )
+
+
+def decoder_arrays_of(dataset: xr.Dataset) -> DecoderArrays:
+    """The decoder's arrays in a `neural_btf` or `compressed_btf` dataset."""
+    return {name: dataset[name].values for name in DECODER_ARRAY_NAMES}
+
+
+def _decoder_variables(arrays: DecoderArrays) -> dict[str, Any]:
+    """A decoder's arrays with the dimensions that the schemas give them."""
+    declared = schemas.COMPRESSED_BTF.variables
+    return {name: (declared[name].dims, values) for name, values in arrays.items()}
+
+
+# ---- compressed BTF --------------------------------------------------------------------------
+
+
+def packed_btf(
+    neural_btf: xr.Dataset, abrdf_clusters: xr.Dataset, abrdf_matrix: xr.Dataset
+) -> CompressedBtf:
+    """The runtime BTF of a trained network, put together from what three assets hold."""
+    return compressed_btf(
+        decoder_arrays_of(neural_btf),
+        neural_btf["latents"].values,
+        abrdf_clusters["ids"].values,
+        float(abrdf_matrix["alpha"]),
+        (int(abrdf_matrix["height"]), int(abrdf_matrix["width"])),
+    )
+
+
+def compressed_btf_dataset(compressed: CompressedBtf) -> xr.Dataset:
+    """`compressed_btf` of a runtime BTF."""
+    import numpy as np
+    import xarray as xr
+
+    variables = {
+        **_decoder_variables(compressed.decoder),
+        "latents": (("cluster", "latent"), compressed.latents),
+        "alpha": ((), compressed.alpha),
+        "height": ((), np.int32(compressed.height)),
+        "width": ((), np.int32(compressed.width)),
+    }
+    if compressed.ids is not None:
+        variables["ids"] = ("texel", compressed.ids)
+    return xr.Dataset(variables)
+
+
+def compressed_btf_of(dataset: xr.Dataset) -> CompressedBtf:
+    """The runtime BTF that a `compressed_btf` dataset holds."""
     return CompressedBtf(
-        decoder_of(arrays),
+        decoder_arrays_of(dataset),
         dataset["latents"].values,
         dataset["ids"].values if "ids" in dataset else None,
         float(dataset["alpha"]),
@@ -54,10 +259,57 @@ def compressed(dataset: xr.Dataset) -> CompressedBtf:
     )
 
 
-def payload_bytes(dataset: xr.Dataset) -> int:
-    """Bytes of decoder, latents and index list of a `compressed_btf` dataset (table 1)."""
-    return sum(
-        int(dataset[name].nbytes)
-        for name in dataset
-        if str(name).startswith(("weight_", "bias_")) or name in ("latents", "ids")
+# ---- restored photographs, frames ------------------------------------------------------------
+
+
+def restored_images_dataset(
+    compressed: CompressedBtf,
+    errors: RestorationErrors,
+    btf_images: xr.Dataset,
+    shown: NDArray[np.integer],
+) -> xr.Dataset:
+    """`restored_images`: the photographs with these numbers restored, and all errors."""
+    import numpy as np
+    import xarray as xr
+
+    pairs = pairs_of(btf_images)
+    chosen = Pairs(pairs.light[shown], pairs.view[shown])
+    original = btf_images["images"][shown].values.astype(np.float32)
+    return xr.Dataset(
+        {
+            "original": (("pair", *_PIXELS, "channel"), original),
+            "restored": (("pair", *_PIXELS, "channel"), compressed.photographs(chosen)),
+            "pair_light": (("pair", "angle"), chosen.light),
+            "pair_view": (("pair", "angle"), chosen.view),
+            "rmse": ((), errors.rmse),
+            "rmse_image": ("image", errors.of_image),
+            "rmse_texel": (_PIXELS, errors.of_texel.reshape(compressed.height, compressed.width)),
+            "light": btf_images["light"],
+            "view": btf_images["view"],
+        }
     )
+
+
+def cloth_frames_dataset(frames: Frames, lights: NDArray[np.float64]) -> xr.Dataset:
+    """`cloth_frames` of pictures under lights (frame, 2)."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "frames": (("frame", *_PIXELS, "channel"), frames.pictures),
+            "light_direction": (("frame", "angle"), lights),
+            "coverage": ((), frames.coverage),
+        }
+    )
+
+
+def _load_trained(version: StoredVersion) -> TrainedNetwork:
+    return trained_network_of(version.dataset, version.input("abrdf_matrix").sizes["image"])
+
+
+LOADERS: dict[str, Callable[[StoredVersion], object]] = {
+    "abrdf_clusters": lambda version: abrdf_clusters_of(version.dataset),
+    "neural_btf": _load_trained,
+    "compressed_btf": lambda version: compressed_btf_of(version.dataset),
+}
+"""What ``tsuya.load`` gives, by asset: the clusters, the trained network, the runtime BTF."""

@@ -2,37 +2,144 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
-    compressed,
+    abrdf_clusters_of,
+    abrdf_reader,
+    compressed_btf_dataset,
+    compressed_btf_of,
+    decoder_arrays_of,
+    neural_btf_dataset,
+    packed_btf,
     pairs_of,
-    payload_bytes,
-    reader,
 )
-from assets_defs.neural_btf.declaration import BTF, NetworkSettings
-from assets_defs.settings import Settings
-from assets_defs.system import Metadata
+from assets_defs.neural_btf.declaration import BTF
+from assets_defs.neural_btf.photographs import texels_and_photographs
+from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.neural_btf import figures
+from pipelines.neural_btf.decoder_arrays import direction_inputs
+from pipelines.neural_btf.training.plan import Targets, Training, TrainingPlan, WarmStart
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
 from storage.work_state import WorkState
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
 
-    from pipelines.neural_btf.training import TrainingData
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
+    from pipelines.neural_btf.training.data import TrainingData
 
 _POOL_BYTES = 6 << 30
 
 
 # ---- neural_btf ------------------------------------------------------------------------------
+
+
+class NetworkSettings(Settings):
+    """How the network is trained."""
+
+    training: Training = Field(
+        "fast", description="paper: SGD on five ABRDFs through the encoder; fast: see docs/btf.md"
+    )
+    steps: int = Field(250, ge=1, description="Fast: steps of gradient descent")
+    rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
+    batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
+    batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
+    warm_start: WarmStart = Field("pca", description="Fast: where the latents start")
+    encoder_share: float = Field(
+        0.25, ge=0.0, le=1.0, description="Warm start encoder: share of the steps through it"
+    )
+    encoder_steps: int = Field(
+        25, ge=0, description="Fast: steps of fitting the encoder to the latents at the end"
+    )
+    paper_steps: int = Field(2000, ge=1, description="Paper: steps of gradient descent")
+    paper_rate: float = Field(0.08, gt=0.0, le=1.0, description="Paper: learning rate")
+    paper_batch: int = Field(
+        5, ge=2, description="Paper: ABRDFs of a batch, each with all its directions (our reading)"
+    )
+    targets: Targets = Field(
+        "texels", description="Paper: fit every texel, or its cluster's representative (unsaid)"
+    )
+    widths: list[int] = Field(
+        [],
+        max_length=9,
+        description="Channels of the encoder's blocks (unsaid); empty: 8, 16, 16, …",
+    )
+    network_seed: int = Field(0, ge=0, description="Seed of the network and its batches")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"steps": 120, "batch_images": 64, "encoder_steps": 10, "paper_steps": 30},
+        "paper": {"steps": 16_000, "encoder_steps": 300, "paper_steps": 200_000},
+    }
+
+
+@BTF.before_work
+def _check_widths(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
+    """Refuse too deep an encoder before anything is made."""
+    if "clusters" not in sources:
+        return
+    network = settings["neural_btf"]
+    assert isinstance(network, NetworkSettings)
+    _, images = texels_and_photographs(sources["material"], settings["btf_images"])
+    if 3 ** len(network.widths) > images or any(width < 1 for width in network.widths):
+        raise ValueError(
+            f"{sources['material'].name}: widths is {network.widths}; expected fewer positive "
+            f"numbers, as every block leaves a third of {images} photographs."
+        )
+
+
+def training_plan(settings: NetworkSettings) -> TrainingPlan:
+    """The plan that the settings describe."""
+    paper = settings.training == "paper"
+    return TrainingPlan(
+        training=settings.training,
+        steps=settings.paper_steps if paper else settings.steps,
+        rate=settings.paper_rate if paper else settings.rate,
+        batch_texels=settings.paper_batch if paper else settings.batch_texels,
+        batch_images=settings.batch_images,
+        widths=tuple(settings.widths),
+        warm_start=settings.warm_start,
+        encoder_share=settings.encoder_share,
+        encoder_steps=settings.encoder_steps,
+        targets=settings.targets,
+        seed=settings.network_seed,
+    )
+
+
+def stored_training_data(
+    plan: TrainingPlan, abrdf_matrix: xr.Dataset, abrdf_clusters: xr.Dataset
+) -> TrainingData:
+    """What the network is fitted to by a plan; of a large matrix a part at a time is in memory."""
+    from pipelines.neural_btf.abrdf_pool import AbrdfPool
+    from pipelines.neural_btf.training.data import AbrdfScale, training_data
+
+    abrdfs = abrdf_matrix["abrdfs"]
+    texels, images, _ = abrdfs.shape
+    pool = AbrdfPool(
+        abrdf_reader(abrdf_matrix),
+        texels,
+        images,
+        block=abrdfs.chunks[0][0] if abrdfs.chunks else texels,
+        budget=_POOL_BYTES,
+        seed=plan.seed,
+    )
+    return training_data(
+        pool,
+        abrdf_clusters_of(abrdf_clusters),
+        AbrdfScale(
+            abrdf_matrix["mean"].values,
+            abrdf_matrix["deviation"].values,
+            float(abrdf_matrix["alpha"]),
+        ),
+        direction_inputs(pairs_of(abrdf_matrix)),
+        plan,
+    )
 
 
 def _curve_pictures(dataset: xr.Dataset) -> Pictures:
@@ -41,14 +148,12 @@ def _curve_pictures(dataset: xr.Dataset) -> Pictures:
     return {"loss": loss_curve(dataset["curve_step"].values, dataset["curve_rmse"].values)}
 
 
-def _loss_ratio(checked: StoredVersion) -> float:
-    curve = checked.dataset["curve_rmse"].values
-    tenth = max(1, len(curve) // 10)
-    return float(curve[-tenth:].mean() / curve[:tenth].mean())
+def _loss_ratio(version: StoredVersion) -> float:
+    return figures.loss_ratio(version.dataset["curve_rmse"].values)
 
 
-def _encoder_residual(checked: StoredVersion) -> float | None:
-    dataset = checked.dataset
+def _encoder_residual(version: StoredVersion) -> float | None:
+    dataset = version.dataset
     return float(dataset["encoder_residual"]) if "encoder_residual" in dataset else None
 
 
@@ -78,102 +183,19 @@ def _encoder_residual(checked: StoredVersion) -> float | None:
 )
 def neural_btf(
     settings: NetworkSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     work: WorkState,
     abrdf_matrix: xr.Dataset,
     abrdf_clusters: xr.Dataset,
 ) -> Result:
     """Train the network; a run that was killed goes on where it was."""
-    import xarray as xr
+    from pipelines.neural_btf.training.trainer import train
 
-    from pipelines.neural_btf.network import decoder_arrays, encoder_vector
-    from pipelines.neural_btf.training import train
-
-    data = training_data(settings, abrdf_matrix, abrdf_clusters)
-    plan = training_plan(settings, abrdf_matrix.sizes["image"])
+    plan = training_plan(settings)
+    data = stored_training_data(plan, abrdf_matrix, abrdf_clusters)
     trained = train(data, plan, resume=work.read(), keep=work.keep, progress=progress)
-    variables = {
-        **_decoder_variables(decoder_arrays(trained.decoder)),
-        "latents": (("cluster", "latent"), trained.latents),
-        "encoder": ("parameter", encoder_vector(trained.encoder)),
-        "curve_step": ("point", trained.curve_step),
-        "curve_rmse": ("point", trained.curve_rmse),
-    }
-    if trained.encoder_residual is not None:
-        variables["encoder_residual"] = ((), trained.encoder_residual)
-    dataset = xr.Dataset(variables, attrs={"widths": list(plan.widths)})
-    return dataset, {"RMSE of the last batches": float(trained.curve_rmse[-1])}
-
-
-def training_plan(settings: NetworkSettings, images: int) -> Any:
-    """The plan that the settings describe, for a number of photographs."""
-    from pipelines.neural_btf.network import encoder_blocks
-    from pipelines.neural_btf.training import Plan
-
-    paper = settings.training == "paper"
-    return Plan(
-        training=settings.training,
-        steps=settings.paper_steps if paper else settings.steps,
-        rate=settings.paper_rate if paper else settings.rate,
-        batch_texels=settings.paper_batch if paper else settings.batch_texels,
-        batch_images=settings.batch_images,
-        widths=tuple(settings.widths) or (8, *(16,) * (encoder_blocks(images) - 1)),
-        warm_start=settings.warm_start,
-        encoder_share=settings.encoder_share,
-        encoder_steps=settings.encoder_steps,
-        seed=settings.network_seed,
-    )
-
-
-def training_data(
-    settings: NetworkSettings, abrdf_matrix: xr.Dataset, abrdf_clusters: xr.Dataset
-) -> TrainingData:
-    """What the network is fitted to, by the settings."""
-    import numpy as np
-
-    from pipelines.neural_btf.network import direction_inputs
-    from pipelines.neural_btf.pool import AbrdfPool, mean_abrdfs
-    from pipelines.neural_btf.training import TrainingData
-
-    abrdfs = abrdf_matrix["abrdfs"]
-    texels, images, _ = abrdfs.shape
-    ids = abrdf_clusters["ids"].values
-    sizes = abrdf_clusters["sizes"].values
-    seen = abrdf_clusters.get("representatives")
-    representatives = None if seen is None else seen.values
-    pool = AbrdfPool(
-        reader(abrdfs),
-        texels,
-        images,
-        block=abrdfs.chunks[0][0] if abrdfs.chunks else texels,
-        budget=_POOL_BYTES,
-        seed=settings.network_seed,
-    )
-    owner, weights = ids.astype(np.int64), np.ones(texels)
-    if representatives is not None:
-        if settings.training == "fast":
-            pool = AbrdfPool.of_array(mean_abrdfs(pool, ids, len(sizes)))
-            owner, weights = np.arange(len(sizes)), sizes.astype(np.float64)
-        elif settings.targets == "representatives":
-            pool = AbrdfPool.of_array(representatives.astype(np.float16))
-            owner, weights = np.arange(len(sizes)), sizes.astype(np.float64)
-    return TrainingData(
-        pool=pool,
-        owner=owner,
-        weights=weights,
-        representatives=representatives,
-        mean=abrdf_matrix["mean"].values,
-        deviation=abrdf_matrix["deviation"].values,
-        directions=direction_inputs(pairs_of(abrdf_matrix)),
-        alpha=float(abrdf_matrix["alpha"]),
-        start=abrdf_clusters["start"].values,
-    )
-
-
-def _decoder_variables(arrays: Mapping[str, NDArray[np.float32]]) -> dict[str, Any]:
-    """A decoder's arrays with the dimensions that the schemas give them."""
-    declared = schemas.COMPRESSED_BTF.variables
-    return {name: (declared[name].dims, values) for name, values in arrays.items()}
+    shown = {"RMSE of the last batches": float(trained.curve_rmse[-1])}
+    return neural_btf_dataset(trained), shown
 
 
 # ---- compressed_btf --------------------------------------------------------------------------
@@ -183,30 +205,19 @@ class PackSettings(Settings):
     """Nothing to choose: the payload is the paper's."""
 
 
-def _bytes_over_table(checked: StoredVersion) -> float:
-    from pipelines.neural_btf.figures import table_bytes
-
-    dataset = checked.dataset
-    texels = int(dataset["height"]) * int(dataset["width"])
-    return abs(payload_bytes(dataset) - table_bytes(dataset.sizes["cluster"], texels))
+def _bytes_over_table(version: StoredVersion) -> float:
+    return figures.bytes_over_table(compressed_btf_of(version.dataset))
 
 
-def _decoding_error(checked: StoredVersion) -> float:
-    """Largest step between the stored form's and the trained network's values, 64 texels."""
-    import numpy as np
-
-    from pipelines.neural_btf.figures import decoded_plainly
-    from pipelines.neural_btf.network import direction_inputs
-
-    stored = compressed(checked.dataset)
-    trained = checked.input("neural_btf").load()
-    ids = checked.input("abrdf_clusters")["ids"].values
-    directions = direction_inputs(pairs_of(checked.input("abrdf_matrix")))[::97]
-    texels = np.unique(np.linspace(0, stored.texels - 1, 64).astype(int))
-    arrays = {str(name): trained[name].values for name in trained}
-    expected = decoded_plainly(arrays, arrays["latents"][ids[texels]], directions)
-    found = np.concatenate([stored.abrdfs(texel, texel + 1, directions) for texel in texels])
-    return float(np.abs(found - expected).max())
+def _decoding_error(version: StoredVersion) -> float:
+    trained = version.input("neural_btf").load()
+    ids = version.input("abrdf_clusters")["ids"].values
+    return figures.decoding_error(
+        compressed_btf_of(version.dataset),
+        decoder_arrays_of(trained),
+        trained["latents"].values[ids],
+        direction_inputs(pairs_of(version.input("abrdf_matrix"))),
+    )
 
 
 @BTF.asset(
@@ -236,24 +247,11 @@ def compressed_btf(
     neural_btf: xr.Dataset,
 ) -> Result:
     """Put together what is needed at run time."""
-    return packed(neural_btf, abrdf_clusters, abrdf_matrix)
-
-
-def packed(neural_btf: xr.Dataset, abrdf_clusters: xr.Dataset, abrdf_matrix: xr.Dataset) -> Result:
-    """The runtime BTF as a dataset, and its bytes."""
-    kept = [name for name in schemas.COMPRESSED_BTF.variables if name in neural_btf]
-    dataset = neural_btf[kept].assign(
-        {name: abrdf_matrix[name] for name in ("alpha", "height", "width")}
-    )
-    texels = abrdf_clusters.sizes["texel"]
-    if abrdf_clusters.sizes["cluster"] < texels:
-        dataset["ids"] = abrdf_clusters["ids"]
-    dataset.attrs = {}
-    payload = payload_bytes(dataset)
-    images = abrdf_matrix.sizes["image"]
+    packed = packed_btf(neural_btf, abrdf_clusters, abrdf_matrix)
+    values = abrdf_matrix["abrdfs"].size
     shown = {
-        "payload bytes": payload,
-        "ratio to float32": images * texels * 12 / payload,
-        "ratio to 8 bit": images * texels * 3 / payload,
+        "payload bytes": packed.payload_bytes,
+        "ratio to float32": values * 4 / packed.payload_bytes,
+        "ratio to 8 bit": values / packed.payload_bytes,
     }
-    return dataset, shown
+    return compressed_btf_dataset(packed), shown

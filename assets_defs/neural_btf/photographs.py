@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
+    LazyPhotographs,
+    btf_images_dataset,
     pairs_of,
+    photograph_blocks,
 )
-from assets_defs.neural_btf.declaration import BTF, ImageSettings
+from assets_defs.neural_btf.declaration import BTF
+from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.neural_btf import figures
 from storage.readers.btf import open_btf
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
@@ -21,10 +30,33 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
-_BAND_BYTES = 1 << 20
+class ImageSettings(Settings):
+    """How the BTF is taken in, or measured on the virtual gonioreflectometer."""
+
+    crop: tuple[int, int, int, int] | None = Field(
+        None, description="Left, top, width, height in pixels; whole photographs by default"
+    )
+    texels: int = Field(48, ge=4, le=1024, description="Virtual cloth: texels a side")
+    directions: Literal[15, 41, 81, 151] = Field(
+        41, description="Virtual cloth: directions of lights, and of views (15, 41, 81 or 151)"
+    )
+    samples: int = Field(2, ge=1, le=256, description="Virtual cloth: rays a texel")
+    cloth_seed: int = Field(0, ge=0, description="Virtual cloth: seed")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"texels": 12, "directions": 15, "samples": 1},
+        "paper": {"texels": 100, "directions": 81, "samples": 4},
+    }
+
+
+def texels_and_photographs(material: Source, settings: Settings) -> tuple[int, int]:
+    """How many there will be of a material, by its `btf_images` settings."""
+    assert isinstance(settings, ImageSettings)
+    if material.path is None:
+        return settings.texels**2, settings.directions**2
+    measured = open_btf(material.path, settings.crop)
+    return measured.height * measured.width, measured.images
 
 
 def _image_pictures(dataset: xr.Dataset) -> Pictures:
@@ -34,19 +66,86 @@ def _image_pictures(dataset: xr.Dataset) -> Pictures:
     return {"photographs": photograph_sheet(shown.values)}
 
 
-def _missing_pairs(checked: StoredVersion) -> float:
-    from pipelines.neural_btf.figures import missing_pairs
-
-    return missing_pairs(pairs_of(checked.dataset))
+def _missing_pairs(version: StoredVersion) -> float:
+    return figures.missing_pairs(pairs_of(version.dataset))
 
 
-def _dark_share(checked: StoredVersion) -> float:
-    images = checked.dataset["images"]
-    return float((images.max(dim=("y", "x", "channel")) <= 0).mean().compute())
+def _dark_share(version: StoredVersion) -> float:
+    return figures.dark_share(photograph_blocks(version.dataset["images"]))
 
 
-def _mean_radiance(checked: StoredVersion) -> float:
-    return float(checked.dataset["images"].mean(dtype="float64").compute())
+def _mean_radiance(version: StoredVersion) -> float:
+    return figures.mean_radiance(photograph_blocks(version.dataset["images"]))
+
+
+def _measured(path: Path, settings: ImageSettings) -> LazyPhotographs:
+    """Photographs of the user's."""
+    from pipelines.light.directions import Pairs
+
+    measured = open_btf(path, settings.crop)
+    about = {"layout": measured.layout, "colour": measured.colour}
+    if measured.shifted_lights:
+        about["shifted lights"] = f"{measured.shifted_lights} photographs, nominal angles kept"
+    return LazyPhotographs(
+        Pairs(measured.light, measured.view),
+        measured.height,
+        measured.width,
+        measured.lights_per_view,
+        measured.read,
+        about,
+    )
+
+
+def _virtual(material: str, settings: ImageSettings) -> LazyPhotographs:
+    """Photographs of a virtual cloth, of any view at a time."""
+    from pipelines.light.directions import all_pairs, hemisphere_table
+    from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
+    from pipelines.virtual.cloth.weaves import make_cloth
+
+    directions = hemisphere_table(settings.directions)
+    size = (settings.texels, settings.texels)
+    cloth = make_cloth(material, settings.cloth_seed)
+    gonio = Gonioreflectometer(cloth, directions, size, settings.samples, settings.cloth_seed)
+
+    def read(first: int, last: int) -> NDArray[np.float32]:
+        view, light = divmod(first, len(directions))
+        if light or last - first != len(directions):
+            raise IndexError(f"photographs {first} to {last} are not one view's")
+        return gonio.photographs(directions[view])
+
+    return LazyPhotographs(
+        all_pairs(directions, directions),
+        *size,
+        len(directions),
+        _one_at_a_time(read),  # the gonioreflectometer uses all cores by itself
+        {"layout": "virtual gonioreflectometer", "colour": "linear RGB"},
+    )
+
+
+def _one_at_a_time(
+    read: Callable[[int, int], NDArray[np.float32]],
+) -> Callable[[int, int], NDArray[np.float32]]:
+    """The same reader, asked by one thread at a time."""
+    lock = threading.Lock()
+
+    def reading(first: int, last: int) -> NDArray[np.float32]:
+        with lock:
+            return read(first, last)
+
+    return reading
+
+
+def _telling(photographs: LazyPhotographs, progress: Progress) -> LazyPhotographs:
+    """The same photographs, which tell how many have been read."""
+    done: set[int] = set()
+
+    def read(first: int, last: int) -> NDArray[np.float32]:
+        images = photographs.read(first, last)
+        done.update(range(first, last))
+        progress(len(done) / len(photographs.pairs.light))
+        return images
+
+    return photographs._replace(read=read)
 
 
 @BTF.asset(
@@ -78,119 +177,14 @@ def _mean_radiance(checked: StoredVersion) -> float:
         ),
     ),
 )
-def btf_images(
-    settings: ImageSettings, source: Source, progress: Callable[[float], None]
-) -> Result:
+def btf_images(settings: ImageSettings, source: Source, progress: Progress) -> Result:
     """Open the photographs, or photograph the virtual cloth; both lazily, view by view."""
-    import xarray as xr
-
-    from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
-
-    if source.path is None:
-        directions = hemisphere_table(settings.directions)
-        pairs = all_pairs(directions, directions)
-        height = width = settings.texels
-        read = _virtual_photographs(source.key, settings, directions, progress)
-        about = {"layout": "virtual gonioreflectometer", "colour": "linear RGB"}
-        lights = len(directions)
-    else:
-        measured = open_btf(source.path, settings.crop)
-        pairs = Pairs(measured.light, measured.view)
-        height, width = measured.height, measured.width
-        read = _told(measured.read, measured.images, progress)
-        about = {"layout": measured.layout, "colour": measured.colour}
-        if measured.shifted_lights:
-            about["shifted lights"] = f"{measured.shifted_lights} photographs, nominal angles kept"
-        lights = measured.lights_per_view
-    dataset = xr.Dataset(
-        {
-            "images": (
-                ("image", "y", "x", "channel"),
-                _lazy_images(read, len(pairs.light), lights, height, width),
-            ),
-            "light": (("image", "angle"), pairs.light),
-            "view": (("image", "angle"), pairs.view),
-        },
-        attrs={"name": source.name, **about},
+    photographs = (
+        _virtual(source.key, settings) if source.path is None else _measured(source.path, settings)
     )
-    return dataset, {"photographs": len(pairs.light), "texels": height * width, **about}
-
-
-def _virtual_photographs(
-    material: str,
-    settings: ImageSettings,
-    directions: NDArray[np.float64],
-    progress: Callable[[float], None],
-) -> Callable[[int, int], NDArray[np.float32]]:
-    """Photographs first … last - 1, all of one view."""
-    import threading
-
-    from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
-    from pipelines.virtual.cloth.weaves import make_cloth
-
-    lock = threading.Lock()  # the gonioreflectometer uses all cores by itself
-    size = (settings.texels, settings.texels)
-    cloth = make_cloth(material, settings.cloth_seed)
-    gonio = Gonioreflectometer(cloth, directions, size, settings.samples, settings.cloth_seed)
-    done: set[int] = set()
-
-    def read(first: int, last: int) -> NDArray[np.float32]:
-        view, light = divmod(first, len(directions))
-        if light or last - first != len(directions):
-            raise IndexError(f"photographs {first} to {last} are not one view's")
-        with lock:
-            photographs = gonio.photographs(directions[view])
-            done.add(view)
-            progress(len(done) / len(directions))
-        return photographs
-
-    return read
-
-
-def _told(
-    read: Callable[[int, int], NDArray[np.float32]],
-    images: int,
-    progress: Callable[[float], None],
-) -> Callable[[int, int], NDArray[np.float32]]:
-    """The same reader, which tells how far it has come."""
-    done: set[int] = set()
-
-    def telling(first: int, last: int) -> NDArray[np.float32]:
-        photographs = read(first, last)
-        done.update(range(first, last))
-        progress(len(done) / images)
-        return photographs
-
-    return telling
-
-
-def _lazy_images(
-    read: Callable[[int, int], NDArray[np.float32]],
-    images: int,
-    block: int,
-    height: int,
-    width: int,
-) -> Any:
-    """A lazy array (image, y, x, channel) float16, read a view at a time.
-
-    Its chunks are bands of rows of a view's photographs: the transposition to texels reads one
-    band of all views at a time, and no more.
-    """
-    import dask
-    import dask.array as da
-    import numpy as np
-
-    from pipelines.neural_btf.abrdf import check_values
-
-    def half(first: int, last: int) -> NDArray[np.float16]:
-        values = read(first, last)
-        check_values(values)
-        return values.astype(np.float16)
-
-    parts = []
-    for first in range(0, images, block):
-        last = min(first + block, images)
-        shape = (last - first, height, width, 3)
-        parts.append(da.from_delayed(dask.delayed(half)(first, last), shape, np.float16))
-    rows = -(-_BAND_BYTES // (block * width * 3 * 2))
-    return da.concatenate(parts).rechunk({1: min(rows, height)})
+    shown = {
+        "photographs": len(photographs.pairs.light),
+        "texels": photographs.height * photographs.width,
+        **photographs.about,
+    }
+    return btf_images_dataset(_telling(photographs, progress), source.name), shown

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
-    compressed,
+    abrdf_reader,
+    cloth_frames_dataset,
+    compressed_btf_of,
     pairs_of,
-    reader,
+    restored_images_dataset,
 )
 from assets_defs.neural_btf.declaration import BTF, NONE
 from assets_defs.settings import Preset, Settings
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.neural_btf import figures
+from storage.errors import NoVersionError
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
 from storage.versions import Slot
@@ -25,8 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
+    from pipelines.light.directions import Pairs
 
 _BLOCK_BYTES = 96 << 20
 
@@ -53,45 +56,38 @@ def _restored_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _rmse(checked: StoredVersion) -> float:
-    return float(checked.dataset["rmse"])
+def _rmse(version: StoredVersion) -> float:
+    return float(version.dataset["rmse"])
 
 
-def _rmse_over_none(checked: StoredVersion) -> float | None:
+def _rmse_over_none(version: StoredVersion) -> float | None:
     """Against the same material's version without clusters, if it was made alike."""
-    from storage.errors import NoVersionError
-
-    clusters, material = checked.slot.partition.split(".", 1)
+    clusters, material = version.slot.partition.split(".", 1)
     if clusters == NONE:
         return None
-    store, names = checked.store, ("neural_btf", "restored_images")
     try:
-        slots = {name: Slot(BTF.name, name, f"{NONE}.{material}") for name in names}
-        other = store.record(slots["neural_btf"])
-        without = float(store.open(slots["restored_images"])["rmse"])
-        own_slot = Slot(BTF.name, "neural_btf", checked.slot.partition)
-        own = store.record(own_slot)
+        without = _made_of(version, f"{NONE}.{material}")
+        slot = Slot(BTF.name, "restored_images", f"{NONE}.{material}")
+        rmse_without = float(version.store.open(slot)["rmse"])
+        own = _made_of(version, version.slot.partition)
     except NoVersionError:
         return None
-    alike = [
-        (
-            record["settings"],
-            next(i["content"] for i in record["inputs"] if i["asset"] == "abrdf_matrix"),
-        )
-        for record in (own, other)
-    ]
-    return float(checked.dataset["rmse"]) / without if alike[0] == alike[1] else None
+    return float(version.dataset["rmse"]) / rmse_without if own == without else None
 
 
-def _worst(name: str) -> Callable[[StoredVersion], float]:
-    def worst(checked: StoredVersion) -> float:
-        return float(checked.dataset[name].max())
+def _made_of(version: StoredVersion, partition: str) -> tuple[Any, str]:
+    """Settings and ABRDFs (their content) that a partition's current network was trained with."""
+    record = version.store.record(Slot(BTF.name, "neural_btf", partition))
+    (content,) = (i["content"] for i in record["inputs"] if i["asset"] == "abrdf_matrix")
+    return record["settings"], content
 
-    return worst
+
+def _worst_image(version: StoredVersion) -> float:
+    return float(version.dataset["rmse_image"].max())
 
 
-_worst_image = _worst("rmse_image")
-_worst_texel = _worst("rmse_texel")
+def _worst_texel(version: StoredVersion) -> float:
+    return float(version.dataset["rmse_texel"].max())
 
 
 @BTF.asset(
@@ -133,56 +129,45 @@ _worst_texel = _worst("rmse_texel")
 )
 def restored_images(
     settings: RestoreSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     btf_images: xr.Dataset,
     abrdf_matrix: xr.Dataset,
     compressed_btf: xr.Dataset,
 ) -> Result:
     """Restore figure 7's photographs, and compare all of them with what was measured."""
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.light.directions import Pairs
-    from pipelines.neural_btf.compressed import restoration_errors
     from pipelines.neural_btf.pictures import PAPER_PAIRS, nearest_images
+    from pipelines.neural_btf.restoration import restoration_errors
 
-    stored = compressed(compressed_btf)
-    pairs = pairs_of(btf_images)
-    chosen = nearest_images(pairs, PAPER_PAIRS)
-    shown = Pairs(pairs.light[chosen], pairs.view[chosen])
-    abrdfs = abrdf_matrix["abrdfs"]
-    texels = max(1, _BLOCK_BYTES // (abrdfs.shape[1] * 3 * 4))
-    errors = restoration_errors(stored, reader(abrdfs), pairs, block=texels, progress=progress)
-    pixels = ("y", "x")
-    dataset = xr.Dataset(
-        {
-            "original": (
-                ("pair", *pixels, "channel"),
-                btf_images["images"][chosen].values.astype(np.float32),
-            ),
-            "restored": (("pair", *pixels, "channel"), stored.photographs(shown)),
-            "pair_light": (("pair", "angle"), shown.light),
-            "pair_view": (("pair", "angle"), shown.view),
-            "rmse": ((), errors.rmse),
-            "rmse_image": ("image", errors.of_image),
-            "rmse_texel": (pixels, errors.of_texel.reshape(stored.height, stored.width)),
-            "light": btf_images["light"],
-            "view": btf_images["view"],
-        }
+    stored, pairs = compressed_btf_of(compressed_btf), pairs_of(btf_images)
+    block = max(1, _BLOCK_BYTES // (len(pairs.light) * 3 * 4))
+    errors = restoration_errors(
+        stored, abrdf_reader(abrdf_matrix), pairs, block=block, progress=progress
     )
-    worst = int(errors.of_image.argmax())
-    rows = [
+    shown = nearest_images(pairs, PAPER_PAIRS)
+    rows = _error_rows(pairs, errors.of_image, [*shown, int(errors.of_image.argmax())])
+    return restored_images_dataset(stored, errors, btf_images, shown), {
+        "RMSE over alpha": errors.rmse,
+        "pairs shown, and the worst": rows,
+    }
+
+
+def _error_rows(
+    pairs: Pairs, of_image: NDArray[np.float64], numbers: Sequence[int]
+) -> list[dict[str, Any]]:
+    """What the web UI's table says of the photographs with these numbers."""
+    import numpy as np
+
+    return [
         {
             "image": int(number),
             "view theta": float(np.degrees(pairs.view[number, 0])),
             "view phi": float(np.degrees(pairs.view[number, 1])),
             "light theta": float(np.degrees(pairs.light[number, 0])),
             "light phi": float(np.degrees(pairs.light[number, 1])),
-            "RMSE": float(errors.of_image[number]),
+            "RMSE": float(of_image[number]),
         }
-        for number in (*chosen, worst)
+        for number in numbers
     ]
-    return dataset, {"RMSE over alpha": errors.rmse, "pairs shown, and the worst": rows}
 
 
 # ---- cloth_frames ----------------------------------------------------------------------------
@@ -210,12 +195,12 @@ def _cloth_pictures(dataset: xr.Dataset) -> Pictures:
     return {"frames": contact_sheet(dataset["frames"].values[shown])}
 
 
-def _coverage(checked: StoredVersion) -> float:
-    return float(checked.dataset["coverage"])
+def _coverage(version: StoredVersion) -> float:
+    return float(version.dataset["coverage"])
 
 
-def _mean_brightness(checked: StoredVersion) -> float:
-    return float(checked.dataset["frames"].values.mean() / 255.0)
+def _mean_brightness(version: StoredVersion) -> float:
+    return figures.mean_brightness(version.dataset["frames"].values)
 
 
 @BTF.asset(
@@ -243,30 +228,17 @@ def _mean_brightness(checked: StoredVersion) -> float:
         ),
     ),
 )
-def cloth_frames(
-    settings: ClothSettings,
-    progress: Callable[[float], None],
-    compressed_btf: xr.Dataset,
-) -> Result:
+def cloth_frames(settings: ClothSettings, progress: Progress, compressed_btf: xr.Dataset) -> Result:
     """Draw a folded panel of the decoded material under a light that moves around it."""
-    import xarray as xr
-
     from pipelines.neural_btf.panel import draw_frames, moving_lights
 
     lights = moving_lights(settings.frames)
-    drawn = draw_frames(
-        compressed(compressed_btf),
+    frames = draw_frames(
+        compressed_btf_of(compressed_btf),
         lights,
         width=settings.width,
         tiles=settings.tiles,
         supersampling=settings.supersampling,
         progress=progress,
     )
-    dataset = xr.Dataset(
-        {
-            "frames": (("frame", "y", "x", "channel"), drawn.pictures),
-            "light_direction": (("frame", "angle"), lights),
-            "coverage": ((), drawn.coverage),
-        }
-    )
-    return dataset, {"frames": settings.frames}
+    return cloth_frames_dataset(frames, lights), {"frames": settings.frames}

@@ -1,5 +1,21 @@
-"""BTFs compressed by a neural network over clustered ABRDFs (paper 1).
+"""BTFs compressed by a neural network over clustered ABRDFs (docs/btf.md).
 
 M texels, N images (pairs of view and light), k clusters. The ABRDF of a texel is its value in all
-images: an (N, 3) array. The arrays' order is (texel, image, channel), texels row by row.
+images: an (N, 3) array; arrays are (texel, image, channel), texels row by row. Sections, equations
+and tables named in this package are those of paper 1, which the page cites. In the order of the
+method:
+
+1. ``abrdf``: photographs transposed to ABRDFs (``transposed``), their statistics (Eq. 1-4);
+   ``principal_abrdfs``: their principal components, block by block (``summarise_abrdfs``).
+2. ``clusters``: k-means++ on the components (``cluster_abrdfs``), or every texel for itself
+   (``single_texel_clusters``); ``representatives``: the ABRDF that stands for a cluster.
+3. ``training``: encoder, decoder and latents fitted to the ABRDFs (``train``); ``network`` has the
+   networks in torch, ``decoder_arrays`` the decoder's size, inputs and values in NumPy,
+   ``abrdf_pool`` the part of the matrix that is in memory.
+4. ``compressed``: what is kept, and what it decodes to (``CompressedBtf``); ``restoration``: its
+   errors against all photographs (``restoration_errors``).
+5. ``panel``: a folded panel of the material under a moving light (``draw_frames``).
+
+``compression`` does steps 1 to 4 on photographs in memory by one call (``compress_photographs``).
+``pictures`` shows each step; ``figures`` tells whether results are right.
 """

@@ -6,6 +6,8 @@ deviation sigma over the texels, for every photograph and channel by itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -14,14 +16,14 @@ from numpy.typing import NDArray
 LARGEST_HALF = 65504.0
 """Largest number of a half float: BTFs are stored as such."""
 
-Space = Literal["log", "standardised", "linear"]
+AbrdfSpace = Literal["log", "standardised", "linear"]
 """Where distances between ABRDFs are measured: on x2, x3 or x1."""
 
 _LEAST_DEVIATION = 1e-6
 """A photograph of one value has no deviation to divide by: its x3 is 0."""
 
 
-class Statistics(NamedTuple):
+class ImageStatistics(NamedTuple):
     """Mean and deviation of x2 over the texels, and the largest x1, one a photograph."""
 
     mean: NDArray[np.float32]
@@ -30,6 +32,24 @@ class Statistics(NamedTuple):
     """sigma, (image, channel) (Eq. 3), at least 1e-6."""
     largest: NDArray[np.float32]
     """(image,)."""
+
+
+@dataclass(frozen=True)
+class PhotographBlocks:
+    """All photographs of a BTF, a block at a time: iterated over as often as they are wanted."""
+
+    images: int
+    """N, photographs in all blocks together."""
+    read: Callable[[], Iterable[NDArray[np.floating]]]
+    """Starts a pass: blocks (image, y, x, channel), from the first photograph to the last."""
+
+    @classmethod
+    def of_array(cls, images: NDArray[np.floating]) -> PhotographBlocks:
+        """One block of photographs (image, y, x, channel) that are in memory."""
+        return cls(len(images), lambda: [images])
+
+    def __iter__(self) -> Iterator[NDArray[np.floating]]:
+        return iter(self.read())
 
 
 def check_values(values: NDArray[np.floating]) -> None:
@@ -52,11 +72,16 @@ def log_values(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.log1p(values.astype(np.float32))
 
 
-def statistics(images: NDArray[np.floating]) -> Statistics:
-    """Statistics over the texels of photographs (image, y, x, channel)."""
+def image_statistics(images: NDArray[np.floating]) -> ImageStatistics:
+    """Statistics over the texels of photographs (image, y, x, channel).
+
+    >>> found = image_statistics(np.full((5, 4, 4, 3), np.e - 1.0))
+    >>> found.mean.shape, round(float(found.mean[0, 0]), 4)
+    ((5, 3), 1.0)
+    """
     logs = log_values(images).reshape(len(images), -1, images.shape[-1])
     deviation = logs.std(axis=1, dtype=np.float64).astype(np.float32)
-    return Statistics(
+    return ImageStatistics(
         logs.mean(axis=1, dtype=np.float64).astype(np.float32),
         np.maximum(deviation, _LEAST_DEVIATION),
         images.reshape(len(images), -1).max(axis=1).astype(np.float32),
@@ -70,7 +95,7 @@ def standardised(
     return (log_values(values) - mean) / deviation
 
 
-def columns(images: NDArray[np.floating], space: Space) -> NDArray[np.float32]:
+def abrdf_columns(images: NDArray[np.floating], space: AbrdfSpace) -> NDArray[np.float32]:
     """Photographs (image, y, x, channel) as columns of the ABRDF matrix in a space.
 
     Returns (texel, image * channel) float32: what `lowrank.principal_components` reads.
@@ -80,12 +105,12 @@ def columns(images: NDArray[np.floating], space: Space) -> NDArray[np.float32]:
     else:
         values = log_values(images)
         if space == "standardised":
-            found = statistics(images)
+            found = image_statistics(images)
             values = (values - found.mean[:, None, None]) / found.deviation[:, None, None]
     return transposed(values).reshape(images.shape[1] * images.shape[2], -1)
 
 
-def texel_rows(images: Any) -> Any:
+def transposed_view(images: Any) -> Any:
     """Photographs (image, y, x, channel) as (texel, image, channel), texels row by row.
 
     Of a NumPy array or of a lazy one, whose transposition is lazy then.
@@ -95,5 +120,12 @@ def texel_rows(images: Any) -> Any:
 
 
 def transposed(images: NDArray[np.floating]) -> NDArray[np.floating]:
-    """The same, contiguous in memory."""
-    return np.ascontiguousarray(texel_rows(images))
+    """ABRDFs (texel, image, channel) of photographs (image, y, x, channel), contiguous in memory.
+
+    >>> images = np.zeros((225, 6, 8, 3), np.float16)
+    >>> images[7, 2, 5] = 0.5
+    >>> abrdfs = transposed(images)
+    >>> abrdfs.shape, abrdfs[2 * 8 + 5, 7].tolist()
+    ((48, 225, 3), [0.5, 0.5, 0.5])
+    """
+    return np.ascontiguousarray(transposed_view(images))

@@ -1,20 +1,25 @@
-"""The runtime BTF: decoder, latents and cluster numbers, and what they restore."""
+"""The runtime BTF: decoder, latents and cluster numbers, and what they decode to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from pipelines.light.directions import Pairs, stereographic_of_vectors
-from pipelines.neural_btf.network import Decoder, device, direction_inputs
-from pipelines.neural_btf.pool import Read
+from pipelines.light.directions import Pairs
+from pipelines.neural_btf.decoder_arrays import (
+    DecoderArrays,
+    direction_inputs,
+    direction_inputs_of_vectors,
+)
 
-Progress = Callable[[float], None]
+if TYPE_CHECKING:
+    import torch
+
+    from pipelines.neural_btf.network import Decoder
 
 _ROWS = 1 << 14
 """Values decoded at a time: hidden layers that stay in the cache, three times as fast as 2^17."""
@@ -22,9 +27,20 @@ _ROWS = 1 << 14
 
 @dataclass(frozen=True)
 class CompressedBtf:
-    """A BTF as it is used: M texels, k latent vectors."""
+    """A BTF as it is used: M texels, k latent vectors. torch is imported when it decodes.
 
-    decoder: Decoder
+    >>> from pipelines.light.directions import all_pairs, hemisphere_table
+    >>> from pipelines.neural_btf.network import Decoder, decoder_arrays
+    >>> latents, ids = np.zeros((5, 8), np.float32), np.arange(48, dtype=np.int32) % 5
+    >>> btf = CompressedBtf(decoder_arrays(Decoder()), latents, ids, 1.5, height=6, width=8)
+    >>> btf.texels, btf.payload_bytes == 4 * (24_383 + 5 * 8 + 48)
+    (48, True)
+    >>> table = hemisphere_table(15)
+    >>> btf.photographs(all_pairs(table[:2], table)).shape
+    (30, 6, 8, 3)
+    """
+
+    decoder: DecoderArrays
     latents: NDArray[np.float32]
     """(k, 8)."""
     ids: NDArray[np.integer] | None
@@ -39,6 +55,12 @@ class CompressedBtf:
         """M."""
         return self.height * self.width
 
+    @property
+    def payload_bytes(self) -> int:
+        """Bytes of decoder, latents and cluster numbers, as table 1 counts them."""
+        index = 0 if self.ids is None else self.ids.nbytes
+        return sum(part.nbytes for part in self.decoder.values()) + self.latents.nbytes + index
+
     def latents_of(self, texels: NDArray[np.integer] | slice) -> NDArray[np.float32]:
         """Latents (n, 8) of texels, numbered row by row."""
         owners = texels if self.ids is None else self.ids[texels]
@@ -48,12 +70,13 @@ class CompressedBtf:
     def abrdfs(self, first: int, last: int, directions: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values over alpha of texels first … last - 1 in every pair, (texel, pair, 3) float32.
 
-        ``directions`` (pair, 4) as `network.direction_inputs` gives them.
+        ``directions`` (pair, 4) as `decoder_arrays.direction_inputs` gives them.
         """
+        import torch
+
         result = np.empty((last - first, len(directions), 3), np.float32)
         step = max(1, _ROWS // len(directions))
-        where = device()
-        decoder = self.decoder.to(where)
+        decoder, where = self._network
         inputs = torch.from_numpy(directions).to(where)
         with torch.no_grad():
             for start in range(first, last, step):
@@ -78,12 +101,11 @@ class CompressedBtf:
 
         Directions are in the texture's frame: x along u, y along v, z along the normal.
         """
-        inputs = np.concatenate(
-            [stereographic_of_vectors(light), stereographic_of_vectors(view)], axis=1
-        ).astype(np.float32)
+        import torch
+
+        inputs = direction_inputs_of_vectors(light, view)
         result = np.empty((len(texels), 3), np.float32)
-        where = device()
-        decoder = self.decoder.to(where)
+        decoder, where = self._network
         with torch.no_grad():
             for start in range(0, len(texels), _ROWS):
                 part = slice(start, start + _ROWS)
@@ -92,38 +114,24 @@ class CompressedBtf:
                 result[part] = colours.cpu().numpy()
         return result * np.float32(self.alpha)
 
+    @functools.cached_property
+    def _network(self) -> tuple[Decoder, torch.device]:
+        """The decoder in torch, and the device that it is on."""
+        from pipelines.neural_btf.network import decoder_of, device
 
-class RestorationErrors(NamedTuple):
-    """Root of the mean squared error of values over alpha (Eq. 10), over the three channels."""
-
-    rmse: float
-    """Over all images and texels."""
-    of_image: NDArray[np.float64]
-    """(image,)."""
-    of_texel: NDArray[np.float64]
-    """(texel,)."""
+        where = device()
+        return decoder_of(self.decoder).to(where), where
 
 
-def restoration_errors(
-    compressed: CompressedBtf, read: Read, pairs: Pairs, *, block: int, progress: Progress
-) -> RestorationErrors:
-    """Compare all of a BTF with what is restored, ``block`` texels at a time.
+def compressed_btf(
+    decoder: DecoderArrays,
+    latents: NDArray[np.float32],
+    ids: NDArray[np.integer],
+    alpha: float,
+    size: tuple[int, int],
+) -> CompressedBtf:
+    """What is needed at run time of latents (k, 8), for photographs of ``size`` (rows, columns).
 
-    ``read`` gives measured ABRDFs (texel, image, 3).
+    The cluster numbers ``ids`` (texel,) are left out where every texel has latents of its own.
     """
-    directions = direction_inputs(pairs)
-    of_image = np.zeros(len(directions))
-    of_texel = np.zeros(compressed.texels)
-    for first in range(0, compressed.texels, block):
-        last = min(first + block, compressed.texels)
-        step = compressed.abrdfs(first, last, directions)
-        step -= read(first, last).astype(np.float32) / np.float32(compressed.alpha)
-        squares = np.einsum("tic,tic->ti", step, step).astype(np.float64) / 3
-        of_image += squares.sum(axis=0)
-        of_texel[first:last] = squares.mean(axis=1)
-        progress(last / compressed.texels)
-    return RestorationErrors(
-        float(np.sqrt(of_texel.mean())),
-        np.sqrt(of_image / compressed.texels),
-        np.sqrt(of_texel),
-    )
+    return CompressedBtf(decoder, latents, ids if len(latents) < len(ids) else None, alpha, *size)

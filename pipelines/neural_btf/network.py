@@ -7,20 +7,15 @@ the RGB of one texel. Only the decoder and the latents are kept at run time.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from pipelines.light.directions import Pairs, stereographic
+from pipelines.neural_btf.decoder_arrays import DIRECTIONS, HIDDEN, LATENTS, DecoderArrays
 
-LATENTS = 8
-HIDDEN = 106
-"""Neurons of a hidden layer: three of them give the 24 383 parameters of the paper's table 1."""
-
-_DIRECTIONS = 4
 _MOST_AFTER_POOLING = 503
 """Values that may be left after the pooling: 1508 photographs need one block, 22 801 four."""
 
@@ -30,7 +25,12 @@ def encoder_blocks(images: int) -> int:
     return max(1, math.ceil(math.log(images / _MOST_AFTER_POOLING, 3)))
 
 
-def most_blocks(images: int) -> int:
+def default_widths(images: int) -> tuple[int, ...]:
+    """Channels of the blocks of an encoder for so many photographs: 8, 16, 16, … (unsaid)."""
+    return (8, *(16,) * (encoder_blocks(images) - 1))
+
+
+def most_encoder_blocks(images: int) -> int:
     """Blocks that leave at least one value of so many photographs."""
     blocks = 0
     while images >= 3:
@@ -48,6 +48,7 @@ class Encoder(nn.Module):
 
     def __init__(self, images: int, widths: Sequence[int]) -> None:
         super().__init__()
+        self.widths = tuple(widths)
         blocks, channels, length = [], 3, images
         for width in widths:
             blocks += [
@@ -60,7 +61,7 @@ class Encoder(nn.Module):
         if length < 1:
             raise ValueError(
                 f"widths has {len(widths)} blocks for {images} photographs; expected at most "
-                f"{most_blocks(images)}, as every block leaves a third."
+                f"{most_encoder_blocks(images)}, as every block leaves a third."
             )
         self.blocks = nn.Sequential(*blocks)
         self.latents = nn.Linear(channels * length, LATENTS)
@@ -76,7 +77,7 @@ class Decoder(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.first = nn.Linear(LATENTS + _DIRECTIONS, HIDDEN)
+        self.first = nn.Linear(LATENTS + DIRECTIONS, HIDDEN)
         self.second = nn.Linear(HIDDEN, HIDDEN)
         self.third = nn.Linear(HIDDEN, HIDDEN)
         self.last = nn.Linear(HIDDEN, 3)
@@ -108,14 +109,13 @@ class Decoder(nn.Module):
         return colours
 
 
-def direction_inputs(pairs: Pairs) -> NDArray[np.float32]:
-    """Light and view of pairs as the decoder takes them, (image, 4)."""
-    both = [stereographic(pairs.light), stereographic(pairs.view)]
-    return np.concatenate(both, axis=-1).astype(np.float32)
-
-
 def decoder_arrays(decoder: Decoder) -> dict[str, NDArray[np.float32]]:
-    """Weights (out, in) and biases (out,) by name: ``weight_1`` to ``bias_4``."""
+    """A decoder's `decoder_arrays.DecoderArrays`.
+
+    >>> arrays = decoder_arrays(Decoder())
+    >>> arrays["weight_1"].shape, arrays["bias_4"].shape, sum(part.size for part in arrays.values())
+    ((106, 12), (3,), 24383)
+    """
     arrays = {}
     for number, layer in enumerate(decoder.layers, start=1):
         arrays[f"weight_{number}"] = layer.weight.detach().cpu().numpy().astype(np.float32)
@@ -123,7 +123,7 @@ def decoder_arrays(decoder: Decoder) -> dict[str, NDArray[np.float32]]:
     return arrays
 
 
-def decoder_of(arrays: Mapping[str, NDArray[np.floating]]) -> Decoder:
+def decoder_of(arrays: DecoderArrays) -> Decoder:
     """The decoder of arrays named as `decoder_arrays` names them."""
     decoder = Decoder()
     with torch.no_grad():

@@ -82,10 +82,10 @@ def draw_frames(
     compressed: CompressedBtf,
     lights: NDArray[np.float64],
     *,
-    width: int,
-    tiles: float,
-    supersampling: int,
-    progress: Callable[[float], None],
+    width: int = 320,
+    tiles: float = 4.0,
+    supersampling: int = 2,
+    progress: Callable[[float], None] = lambda fraction: None,
 ) -> Frames:
     """Pictures of the panel, ``width`` pixels wide and three quarters as high, one a light.
 

@@ -117,7 +117,7 @@ def error_picture(
     return canvas_picture(canvas)
 
 
-def wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+def material_wall(panels: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """Moving pictures (frame, y, x, 3) of several materials as one, in two rows."""
     return np.stack([contact_sheet(np.stack(frames)) for frames in zip(*panels, strict=True)])
 

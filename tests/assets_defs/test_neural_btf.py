@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -12,12 +13,20 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import LaunchError, Request
+from assets_defs.neural_btf import datasets
 from assets_defs.neural_btf import network as network_assets
-from assets_defs.neural_btf.datasets import payload_bytes
+from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.graph import BTF
-from pipelines import clustering, lowrank
 from pipelines.light import directions
-from pipelines.neural_btf import abrdf, compressed, panel, representatives, training
+from pipelines.neural_btf import (
+    clusters,
+    compressed,
+    panel,
+    principal_abrdfs,
+    restoration,
+)
+from pipelines.neural_btf.training import batches
+from pipelines.neural_btf.training import trainer as training
 from pipelines.virtual.cloth import gonioreflectometer
 from tests.assets_defs.regressions import Regression, assert_check_finds, materialise
 from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
@@ -66,8 +75,8 @@ def test_columns_have_the_bytes_of_the_table(good: Any) -> None:
     without = store.open(BTF.slot("compressed_btf", WITHOUT))
     clustered = store.open(BTF.slot("compressed_btf", CLUSTERED))
     assert "ids" not in without
-    assert payload_bytes(without) == 4 * (24_383 + 8 * 144)
-    assert payload_bytes(clustered) == 4 * (24_383 + 8 * 20 + 144)
+    assert compressed_btf_of(without).payload_bytes == 4 * (24_383 + 8 * 144)
+    assert compressed_btf_of(clustered).payload_bytes == 4 * (24_383 + 8 * 20 + 144)
 
 
 def test_a_version_says_what_it_was_made_of(good: Any) -> None:
@@ -176,9 +185,9 @@ def _weak_components(right: Callable[..., Any], *arguments: Any, **options: Any)
 
 
 def _shifted_start(right: Callable[..., Any], ids: Any, clusters: int) -> Any:
-    order, starts = right(ids, clusters)
-    starts[1] += 1
-    return order, starts
+    members = right(ids, clusters)
+    members.starts[1] += 1
+    return members
 
 
 def _mixed_clusters(right: Callable[..., Any], *arguments: Any) -> Any:
@@ -193,13 +202,13 @@ def _no_rate(right: Callable[..., Any], self: Any, name: str, fraction: float) -
 
 
 def _needless_list(right: Callable[..., Any], *datasets: Any) -> Any:
-    packed, shown = right(*datasets)
-    return packed.assign(ids=datasets[1]["ids"]), shown
+    return dataclasses.replace(right(*datasets), ids=datasets[1]["ids"].values)
 
 
 def _scaled_weights(right: Callable[..., Any], *datasets: Any) -> Any:
-    packed, shown = right(*datasets)
-    return packed.assign(weight_2=packed["weight_2"] * 1.01), shown
+    packed = right(*datasets)
+    scaled = {**packed.decoder, "weight_2": packed.decoder["weight_2"] * np.float32(1.01)}
+    return dataclasses.replace(packed, decoder=scaled)
 
 
 def _swapped_directions(right: Callable[..., Any], pairs: Any) -> Any:
@@ -232,25 +241,25 @@ REGRESSIONS = (
         lambda right, self, view: right(self, view) * 1.1,
         MATERIAL,
     ),
-    Regression("transposition_error", abrdf, "texel_rows", _shifted_texels, MATERIAL),
-    Regression("statistics_error", abrdf, "statistics", _wide_deviation, MATERIAL),
-    Regression("explained", lowrank, "principal_components", _weak_components, MATERIAL),
-    Regression("smallest_cluster", representatives, "members", _shifted_start, CLUSTERED),
-    Regression("spread_ratio", clustering, "k_means_plus_plus", _mixed_clusters, CLUSTERED),
+    Regression("transposition_error", datasets, "transposed_view", _shifted_texels, MATERIAL),
+    Regression("statistics_error", principal_abrdfs, "image_statistics", _wide_deviation, MATERIAL),
+    Regression("explained", principal_abrdfs, "principal_components", _weak_components, MATERIAL),
+    Regression("smallest_cluster", clusters, "cluster_members", _shifted_start, CLUSTERED),
+    Regression("spread_ratio", clusters, "k_means_plus_plus", _mixed_clusters, CLUSTERED),
     Regression("loss_ratio", training.Trainer, "_set_rate", _no_rate, WITHOUT),
     Regression(
         "encoder_residual",
-        training,
+        batches,
         "standardised",
         lambda right, values, *statistics: right(values, *statistics) * 0.0,
         WITHOUT,
     ),
-    Regression("bytes_over_table", network_assets, "packed", _needless_list, WITHOUT),
-    Regression("decoding_error", network_assets, "packed", _scaled_weights, WITHOUT),
-    Regression("rmse", compressed, "direction_inputs", _swapped_directions, WITHOUT),
+    Regression("bytes_over_table", network_assets, "packed_btf", _needless_list, WITHOUT),
+    Regression("decoding_error", network_assets, "packed_btf", _scaled_weights, WITHOUT),
+    Regression("rmse", restoration, "direction_inputs", _swapped_directions, WITHOUT),
     Regression("rmse_over_none", compressed.CompressedBtf, "latents_of", _next_cluster, CLUSTERED),
-    Regression("worst_image", compressed, "direction_inputs", _swapped_directions, WITHOUT),
-    Regression("worst_texel", compressed, "direction_inputs", _swapped_directions, WITHOUT),
+    Regression("worst_image", restoration, "direction_inputs", _swapped_directions, WITHOUT),
+    Regression("worst_texel", restoration, "direction_inputs", _swapped_directions, WITHOUT),
     Regression("coverage", panel, "folded_panel", _tiny_panel, WITHOUT),
     Regression(
         "mean_brightness", panel, "to_8bit", lambda right, picture: right(picture * 0.7), WITHOUT
@@ -302,7 +311,7 @@ def test_a_stopped_training_goes_on_and_gives_what_an_uninterrupted_one_gives(
     steps = training.Trainer.step
 
     def killed(self: training.Trainer) -> None:
-        if self.done == 70:
+        if self.steps_done == 70:
             raise KeyboardInterrupt
         steps(self)
 
@@ -318,7 +327,7 @@ def test_a_stopped_training_goes_on_and_gives_what_an_uninterrupted_one_gives(
 
     def told(self: training.Trainer, kept: bytes) -> None:
         restore(self, kept)
-        restored.append(self.done)
+        restored.append(self.steps_done)
 
     with monkeypatch.context() as patch:
         patch.setattr(training.Trainer, "restore", told)
@@ -341,7 +350,7 @@ def test_a_state_is_of_one_recipe(good: Any, monkeypatch: pytest.MonkeyPatch) ->
     step = training.Trainer.step
 
     def killed(self: training.Trainer) -> None:
-        if self.done == 4:
+        if self.steps_done == 4:
             raise KeyboardInterrupt
         step(self)
 
@@ -399,7 +408,7 @@ def test_a_users_zip_becomes_a_compressed_btf(good: Any, inbox: Path) -> None:
     assert images.attrs["name"] == "Wolle.zip"
     assert "sRGB" in images.attrs["colour"]
     runtime = store.open(BTF.slot("compressed_btf", keys))
-    assert payload_bytes(runtime) == 4 * (24_383 + 8 * 12 + 48)
+    assert compressed_btf_of(runtime).payload_bytes == 4 * (24_383 + 8 * 12 + 48)
     assert (int(runtime["height"]), int(runtime["width"])) == (6, 8)
     runs = good.instance.get_runs_count()
     with pytest.raises(ValueError, match=r"Wolle\.zip: clusters is 49; expected at most 48"):

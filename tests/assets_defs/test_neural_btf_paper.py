@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import Request
-from assets_defs.neural_btf.datasets import payload_bytes
+from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.graph import BTF
 
 MATERIAL = {"material": "silk"}
@@ -35,7 +35,7 @@ def test_the_paper_preset_has_the_papers_sizes_and_passes_its_checks(house: Any)
     np.testing.assert_array_equal(matrix[:, 4321].values, images[4321].values.reshape(10_000, 3))
     for clusters, keys in columns.items():
         runtime = store.open(BTF.slot("compressed_btf", keys))
-        assert payload_bytes(runtime) == PAYLOAD[clusters]
+        assert compressed_btf_of(runtime).payload_bytes == PAYLOAD[clusters]
         assert ("ids" in runtime) == (clusters != "none")
         restored = store.open(BTF.slot("restored_images", keys))
         assert restored["restored"].shape == (2, 100, 100, 3)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
+import dask.array as da
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,13 +15,15 @@ from numpy.typing import NDArray
 
 from pipelines.neural_btf.abrdf import (
     LARGEST_HALF,
-    Space,
+    AbrdfSpace,
+    PhotographBlocks,
+    abrdf_columns,
     check_values,
-    columns,
+    image_statistics,
     log_values,
     standardised,
-    statistics,
     transposed,
+    transposed_view,
 )
 
 shapes = st.tuples(st.integers(1, 5), st.integers(1, 4), st.integers(1, 4), st.integers(1, 3))
@@ -47,7 +51,7 @@ def test_x2_is_equation_1(photographs: NDArray[np.float16]) -> None:
 def test_statistics_are_equations_2_and_3_over_the_texels(
     photographs: NDArray[np.float16],
 ) -> None:
-    found, x2 = statistics(photographs), x2_of(photographs)
+    found, x2 = image_statistics(photographs), x2_of(photographs)
     texels = 5 * 4
     for image in range(7):
         for channel in range(3):
@@ -62,7 +66,7 @@ def test_statistics_are_equations_2_and_3_over_the_texels(
 def test_x3_is_equation_4_and_has_mean_0_and_deviation_1(
     photographs: NDArray[np.float16],
 ) -> None:
-    found = statistics(photographs)
+    found = image_statistics(photographs)
     x3 = standardised(transposed(photographs), found.mean, found.deviation)
     assert x3.dtype == np.float32
     x2 = x2_of(photographs)
@@ -75,11 +79,11 @@ def test_x3_is_equation_4_and_has_mean_0_and_deviation_1(
 @pytest.mark.parametrize("value", [0.0, 0.3, 1234.0, -0.25])
 def test_a_photograph_of_one_value_gives_x3_0(value: float) -> None:
     images = np.full((2, 9, 7, 3), value, np.float16)
-    found = statistics(images)
+    found = image_statistics(images)
     assert (found.deviation > 0).all()
     x3 = standardised(transposed(images), found.mean, found.deviation)
     np.testing.assert_array_equal(x3, 0)
-    np.testing.assert_array_equal(columns(images, "standardised"), 0)
+    np.testing.assert_array_equal(abrdf_columns(images, "standardised"), 0)
 
 
 @settings(deadline=None)
@@ -94,14 +98,37 @@ def test_transposition_takes_every_value_to_its_texel(shape: tuple[int, int, int
         assert abrdfs[y * width + x, image, channel] == images[image, y, x, channel]
 
 
+def test_the_transposed_view_is_of_the_same_values_and_lazy_where_they_are() -> None:
+    images = np.arange(2 * 3 * 4 * 3, dtype=np.float16).reshape(2, 3, 4, 3)
+    np.testing.assert_array_equal(transposed_view(images), transposed(images))
+    lazy = transposed_view(da.from_array(images, chunks=(1, 2, 4, 3)))
+    assert isinstance(lazy, da.Array)
+    np.testing.assert_array_equal(lazy.compute(), transposed(images))
+
+
+def test_blocks_are_read_as_often_as_they_are_wanted(photographs: NDArray[np.float16]) -> None:
+    passes: list[int] = []
+
+    def read() -> Iterator[NDArray[np.float16]]:
+        passes.append(len(passes))
+        yield from (photographs[:3], photographs[3:])
+
+    blocks = PhotographBlocks(7, read)
+    for _ in range(2):
+        np.testing.assert_array_equal(np.concatenate(list(blocks)), photographs)
+    assert passes == [0, 1]
+    (whole,) = PhotographBlocks.of_array(photographs)
+    assert whole is photographs
+
+
 def test_columns_are_the_abrdfs_in_the_three_spaces(photographs: NDArray[np.float16]) -> None:
     x2 = x2_of(photographs)
     mu, sigma = x2.mean(axis=(1, 2), keepdims=True), x2.std(axis=(1, 2), keepdims=True)
-    expected: dict[Space, NDArray[np.floating]] = {
+    expected: dict[AbrdfSpace, NDArray[np.floating]] = {
         "linear": photographs.astype(np.float64), "log": x2, "standardised": (x2 - mu) / sigma,
     }  # fmt: skip
     for space, values in expected.items():
-        found = columns(photographs, space)
+        found = abrdf_columns(photographs, space)
         assert (found.shape, found.dtype) == ((20, 21), np.float32)
         for y, x in np.ndindex(5, 4):
             np.testing.assert_allclose(found[y * 4 + x], values[:, y, x].ravel(), atol=1e-5)
@@ -112,8 +139,8 @@ def test_columns_of_some_photographs_are_some_of_the_columns(
 ) -> None:
     """So a BTF can be read by blocks of photographs, in all spaces."""
     for space in ("linear", "log", "standardised"):
-        parts = [columns(photographs[:3], space), columns(photographs[3:], space)]
-        np.testing.assert_array_equal(np.hstack(parts), columns(photographs, space))
+        parts = [abrdf_columns(photographs[:3], space), abrdf_columns(photographs[3:], space)]
+        np.testing.assert_array_equal(np.hstack(parts), abrdf_columns(photographs, space))
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf import compressed as compressed_module
-from pipelines.neural_btf.compressed import CompressedBtf, restoration_errors
-from pipelines.neural_btf.figures import decoded_plainly
-from pipelines.neural_btf.network import LATENTS, Decoder, decoder_arrays, direction_inputs
+from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.decoder_arrays import LATENTS, decode_in_numpy, direction_inputs
+from pipelines.neural_btf.network import Decoder, decoder_arrays
+from pipelines.neural_btf.restoration import restoration_errors
 
 HEIGHT, WIDTH, CLUSTERS, ALPHA = 5, 4, 6, 3.25
 PAIRS: Pairs = all_pairs(hemisphere_table(15)[:4], hemisphere_table(15))
@@ -26,13 +27,13 @@ def made(*, clustered: bool) -> CompressedBtf:
     count = CLUSTERS if clustered else texels
     latents = random.standard_normal((count, LATENTS)).astype(np.float32)
     ids = random.integers(0, CLUSTERS, texels).astype(np.int32) if clustered else None
-    return CompressedBtf(Decoder(), latents, ids, ALPHA, HEIGHT, WIDTH)
+    return CompressedBtf(decoder_arrays(Decoder()), latents, ids, ALPHA, HEIGHT, WIDTH)
 
 
 def plainly(btf: CompressedBtf, pairs: Pairs = PAIRS) -> NDArray[np.float64]:
     """Values over alpha of all texels, (texel, pair, 3)."""
     stored = [btf.latents[texel if btf.ids is None else btf.ids[texel]] for texel in range(20)]
-    return decoded_plainly(decoder_arrays(btf.decoder), np.stack(stored), direction_inputs(pairs))
+    return decode_in_numpy(btf.decoder, np.stack(stored), direction_inputs(pairs))
 
 
 with_and_without_clusters = pytest.mark.parametrize("clustered", [False, True])
@@ -98,6 +99,18 @@ def test_it_does_not_matter_how_many_values_are_decoded_at_a_time(
     np.testing.assert_allclose(btf.radiance(texels, light, view), whole[1], atol=1e-5)
 
 
+def test_cluster_numbers_are_left_out_where_every_texel_has_its_own_latents() -> None:
+    latents = np.zeros((6, LATENTS), np.float32)
+    decoder = decoder_arrays(Decoder())
+    own = compressed_btf(decoder, latents, np.arange(6, dtype=np.int32), 1.5, (2, 3))
+    assert own.ids is None
+    shared = compressed_btf(decoder, latents[:4], np.arange(6, dtype=np.int32) % 4, 1.5, (2, 3))
+    np.testing.assert_array_equal(shared.ids, [0, 1, 2, 3, 0, 1])
+    assert (shared.alpha, shared.height, shared.width, shared.texels) == (1.5, 2, 3, 6)
+    assert shared.payload_bytes == 4 * (24_383 + 8 * 4 + 6)
+    assert own.payload_bytes == 4 * (24_383 + 8 * 6)
+
+
 # ---- errors ----------------------------------------------------------------------------------
 
 
@@ -122,7 +135,5 @@ def test_errors_are_equation_10_whatever_the_block(clustered: bool, block: int) 
 def test_what_is_restored_exactly_has_no_error() -> None:
     btf = made(clustered=True)
     abrdfs = btf.abrdfs(0, 20, direction_inputs(PAIRS)) * np.float32(ALPHA)
-    found = restoration_errors(
-        btf, lambda a, b: abrdfs[a:b], PAIRS, block=6, progress=lambda share: None
-    )
+    found = restoration_errors(btf, lambda a, b: abrdfs[a:b], PAIRS, block=6)
     assert found.rmse < 1e-6

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
+from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.decoder_arrays import direction_inputs
 from pipelines.neural_btf.figures import (
-    DECODER_PARAMETERS,
-    decoded_plainly,
+    bytes_over_table,
+    dark_share,
+    decoding_error,
+    explained_share,
+    loss_ratio,
+    mean_brightness,
+    mean_radiance,
     missing_pairs,
+    smallest_cluster,
     spread_ratio,
     statistics_error,
     table_bytes,
     transposition_error,
 )
-from pipelines.neural_btf.network import LATENTS, Decoder, decoder_arrays
+from pipelines.neural_btf.network import Decoder, decoder_arrays
 
 
 @pytest.mark.parametrize(
@@ -36,17 +46,42 @@ def test_ratios_are_those_of_the_exact_sizes(clusters: int, ratio: float) -> Non
     assert raw / table_bytes(clusters, 10_000) == pytest.approx(ratio, abs=0.05)
 
 
-def test_the_decoders_parameters_are_counted_from_its_layers() -> None:
-    assert sum(part.numel() for part in Decoder().parameters()) == DECODER_PARAMETERS
+# ---- network -------------------------------------------------------------------------------
 
 
-def test_the_plain_decoder_agrees_with_torchs() -> None:
+def untrained(clusters: int) -> CompressedBtf:
+    """Of 6 x 8 texels."""
     torch.manual_seed(0)
-    decoder, latents, directions = Decoder(), torch.randn(6, LATENTS), torch.randn(11, 4)
-    found = decoded_plainly(decoder_arrays(decoder), latents.numpy(), directions.numpy())
-    with torch.no_grad():
-        expected = decoder.double().grid(latents.double(), directions.double())
-    np.testing.assert_allclose(found, expected.numpy(), rtol=1e-9, atol=1e-12)
+    random = np.random.default_rng(0)
+    latents = random.standard_normal((clusters, 8)).astype(np.float32)
+    ids = random.integers(0, clusters, 48).astype(np.int32) if clusters < 48 else np.arange(48)
+    return compressed_btf(decoder_arrays(Decoder()), latents, ids, 2.0, (6, 8))
+
+
+@pytest.mark.parametrize("clusters", [5, 48])
+def test_a_payload_is_that_of_the_table_and_a_needless_list_is_not(clusters: int) -> None:
+    btf = untrained(clusters)
+    assert bytes_over_table(btf) == 0
+    listed = dataclasses.replace(btf, ids=np.zeros(48, np.int64))
+    assert bytes_over_table(listed) == (8 * 48 if clusters == 48 else 4 * 48)
+    assert bytes_over_table(dataclasses.replace(btf, latents=btf.latents[:, :4])) == clusters * 16
+
+
+def test_the_decoding_error_is_the_largest_step_from_the_networks_values() -> None:
+    btf = untrained(5)
+    table = hemisphere_table(15)
+    directions = direction_inputs(all_pairs(table, table))
+    latents = btf.latents_of(np.arange(48))
+    assert decoding_error(btf, btf.decoder, latents, directions) < 1e-6
+    brighter = {**btf.decoder, "bias_4": btf.decoder["bias_4"] + np.float32([0, 0.25, 0])}
+    found = decoding_error(btf, brighter, latents, directions)
+    assert found == pytest.approx(0.25, abs=1e-6)
+    assert decoding_error(btf, btf.decoder, np.roll(latents, 1, axis=0), directions) > 1e-3
+
+
+def test_the_loss_ratio_is_of_the_last_tenth_over_the_first() -> None:
+    assert loss_ratio(np.array([2.0, 4.0, *[7.0] * 16, 1.0, 0.5])) == pytest.approx(0.75 / 3)
+    assert loss_ratio(np.array([2.0, 9.0, 3.0])) == pytest.approx(1.5)
 
 
 # ---- pairs -----------------------------------------------------------------------------------
@@ -65,7 +100,48 @@ def test_pairs_that_are_missing_or_there_twice_are_counted() -> None:
     assert missing_pairs(Pairs(pairs.light[doubled], pairs.view[doubled])) == 2
 
 
+# ---- values and pictures -------------------------------------------------------------------
+
+
+def test_dark_photographs_are_counted_in_all_blocks() -> None:
+    images = np.full((7, 2, 3, 3), 0.5, np.float16)
+    images[[1, 6]] = 0
+    images[3] = -0.25
+    images[4] = 0
+    images[4, 1, 2, 0] = 0.01  # one texel is enough
+    assert dark_share([images[:2], images[2:]]) == pytest.approx(3 / 7)
+
+
+def test_the_mean_radiance_is_over_all_values_whatever_the_blocks() -> None:
+    images = np.random.default_rng(5).gamma(1, 1, (9, 4, 5, 3)).astype(np.float16)
+    expected = images.astype(np.float64).mean()
+    for cut in (1, 4, 8):
+        assert mean_radiance([images[:cut], images[cut:]]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_explained_share_is_that_of_the_squares() -> None:
+    matrix = np.random.default_rng(6).standard_normal((20, 6))
+    matrix -= matrix.mean(axis=0)
+    lengths = np.linalg.svd(matrix, compute_uv=False)
+    whole = float(np.sum(matrix**2))
+    assert explained_share(lengths, whole) == pytest.approx(1.0)
+    assert explained_share(lengths[:2], whole) == pytest.approx(
+        float(np.sum(lengths[:2] ** 2) / np.sum(lengths**2))
+    )
+
+
+def test_the_mean_brightness_is_of_the_codes() -> None:
+    assert mean_brightness(np.array([[[0, 255]]], np.uint8)) == 0.5
+
+
 # ---- clusters --------------------------------------------------------------------------------
+
+
+def test_the_smallest_cluster_is_0_where_sizes_are_wrong_or_one_is_empty() -> None:
+    ids = np.array([0, 2, 1, 2, 0, 2], np.int32)
+    assert smallest_cluster(ids, np.array([2, 1, 3])) == 1
+    assert smallest_cluster(ids, np.array([2, 2, 2])) == 0
+    assert smallest_cluster(ids, np.array([2, 1, 3, 0])) == 0
 
 
 def test_the_spread_is_all_in_one_cluster_and_none_in_clusters_of_one() -> None:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
 
-from pipelines.light.directions import all_pairs, hemisphere_table
+from pipelines.neural_btf.decoder_arrays import HIDDEN, LATENTS
 from pipelines.neural_btf.network import (
-    HIDDEN,
-    LATENTS,
     Decoder,
     Encoder,
     decoder_arrays,
     decoder_of,
-    direction_inputs,
+    default_widths,
     encoder_blocks,
     encoder_of,
     encoder_vector,
+    most_encoder_blocks,
 )
 
 
@@ -49,6 +46,7 @@ def test_the_decoder_is_as_large_as_in_table_1() -> None:
 @pytest.mark.parametrize(("images", "blocks"), [(6561, 3), (22_801, 4), (1508, 1), (225, 1)])
 def test_an_encoder_has_the_papers_blocks(images: int, blocks: int) -> None:
     assert encoder_blocks(images) == blocks
+    assert default_widths(images) == (8, 16, 16, 16)[:blocks]
     latents = Encoder(images, [4] * blocks)(torch.zeros(2, images, 3))
     assert latents.shape == (2, LATENTS)
 
@@ -65,7 +63,8 @@ def test_an_encoder_has_the_papers_blocks(images: int, blocks: int) -> None:
     ],
 )
 def test_more_blocks_than_photographs_can_be_pooled_by_are_refused(images: int, most: int) -> None:
-    Encoder(images, [2] * most)
+    assert most_encoder_blocks(images) == most
+    assert Encoder(images, [2] * most).widths == (2,) * most
     message = (
         rf"^widths has {most + 1} blocks for {images} photographs; expected at most {most}, as"
     )
@@ -141,22 +140,6 @@ def test_the_grid_has_the_gradient_of_the_decoder() -> None:
     assert len(of_grid) == 8
     for one, part in zip(of_grid, decoder.parameters(), strict=True):
         torch.testing.assert_close(one, part.grad, rtol=1e-4, atol=1e-7)
-
-
-def test_direction_inputs_are_light_then_view_on_the_stereographic_plane() -> None:
-    pairs = all_pairs(hemisphere_table(15), hemisphere_table(41))
-    found = direction_inputs(pairs)
-    assert (found.shape, found.dtype) == ((15 * 41, 4), np.float32)
-    for number in (0, 1, 40, 41, 300, 614):
-        expected = [
-            part
-            for theta, phi in (pairs.light[number], pairs.view[number])
-            for part in (
-                math.tan(theta / 2) * math.cos(phi),
-                math.tan(theta / 2) * math.sin(phi),
-            )
-        ]
-        np.testing.assert_allclose(found[number], expected, atol=1e-7)
 
 
 # ---- storage ---------------------------------------------------------------------------------

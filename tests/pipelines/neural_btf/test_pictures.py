@@ -16,11 +16,11 @@ from pipelines.neural_btf.pictures import (
     cluster_map,
     error_picture,
     loss_curve,
+    material_wall,
     nearest_images,
     photograph_sheet,
     restored_picture,
     shown_images,
-    wall,
 )
 
 TABLE: NDArray[np.float64] = hemisphere_table(81)
@@ -109,7 +109,7 @@ def test_large_photographs_are_not_enlarged() -> None:
 def test_a_wall_has_every_material_in_every_frame() -> None:
     panels = [np.full((4, 6, 8, 3), 50 * number, np.uint8) for number in (1, 2, 3)]
     panels[1][2] = 7
-    found = wall(panels)
+    found = material_wall(panels)
     assert found.shape == (4, 12, 16, 3)
     assert set(np.unique(found[0]).tolist()) == {0, 50, 100, 150}
     assert set(np.unique(found[2]).tolist()) == {0, 50, 7, 150}

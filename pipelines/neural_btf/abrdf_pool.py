@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Read = Callable[[int, int], NDArray[np.floating]]
+AbrdfReader = Callable[[int, int], NDArray[np.floating]]
 """ABRDFs (row, image, channel) of rows first … last - 1."""
 
 
@@ -19,7 +19,7 @@ class AbrdfPool:
     """
 
     def __init__(
-        self, read: Read, rows: int, images: int, *, block: int, budget: int, seed: int
+        self, read: AbrdfReader, rows: int, images: int, *, block: int, budget: int, seed: int
     ) -> None:
         self.read = read
         self.rows, self.images = rows, images

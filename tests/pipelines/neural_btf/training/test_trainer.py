@@ -13,29 +13,32 @@ import torch
 from numpy.typing import NDArray
 
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table, unit_vectors
-from pipelines.lowrank import principal_components
-from pipelines.neural_btf import training
-from pipelines.neural_btf.abrdf import columns, standardised, statistics, transposed
-from pipelines.neural_btf.network import (
-    LATENTS,
-    Decoder,
-    decoder_arrays,
-    direction_inputs,
-    encoder_of,
-    encoder_vector,
+from pipelines.neural_btf.abrdf import PhotographBlocks, standardised, transposed
+from pipelines.neural_btf.abrdf_pool import AbrdfPool, mean_abrdfs
+from pipelines.neural_btf.clusters import AbrdfClusters, single_texel_clusters, warm_start
+from pipelines.neural_btf.decoder_arrays import LATENTS, direction_inputs
+from pipelines.neural_btf.network import Decoder, decoder_arrays, encoder_of, encoder_vector
+from pipelines.neural_btf.principal_abrdfs import summarise_abrdfs
+from pipelines.neural_btf.training import batches
+from pipelines.neural_btf.training import trainer as trainer_module
+from pipelines.neural_btf.training.data import (
+    AbrdfScale,
+    TrainingData,
+    TrainingTargets,
+    training_data,
 )
-from pipelines.neural_btf.pool import AbrdfPool, mean_abrdfs
-from pipelines.neural_btf.training import Plan, Trained, Trainer, TrainingData, train, warm_start
+from pipelines.neural_btf.training.plan import TrainingPlan
+from pipelines.neural_btf.training.trainer import TrainedNetwork, Trainer, train
 
 SIDE = 8
 WIDTHS = (4, 6)
 PAIRS: Pairs = all_pairs(hemisphere_table(15), hemisphere_table(15))
 
-FAST = Plan("fast", 30, 0.01, batch_texels=8, batch_images=16, widths=WIDTHS)
+FAST = TrainingPlan("fast", 30, 0.01, batch_texels=8, batch_images=16, widths=WIDTHS)
 ENCODER_FIRST = dataclasses.replace(
     FAST, warm_start="encoder", encoder_share=0.4, encoder_steps=10, seed=3
 )
-PAPER = Plan("paper", 12, 0.05, batch_texels=5, batch_images=0, widths=WIDTHS)
+PAPER = TrainingPlan("paper", 12, 0.05, batch_texels=5, batch_images=0, widths=WIDTHS)
 PLANS = pytest.mark.parametrize(
     "plan",
     [dataclasses.replace(FAST, encoder_steps=10), ENCODER_FIRST, PAPER],
@@ -75,30 +78,23 @@ IMAGES = photographs()
 
 def data_of(clusters: int | None = None, *, budget: int | None = None) -> TrainingData:
     """All texels, each with its own latents, or in clusters with their means as targets."""
-    found = statistics(IMAGES)
+    found = summarise_abrdfs(PhotographBlocks.of_array(IMAGES), components=LATENTS)
     abrdfs = transposed(IMAGES)
     texels, count = abrdfs.shape[:2]
-    scores = principal_components(lambda: [columns(IMAGES, "log")], LATENTS).scores
-    if clusters is None:
-        pool = AbrdfPool.of_array(abrdfs)
-        if budget is not None:
-            pool = AbrdfPool(
-                lambda a, b: abrdfs[a:b], texels, count, block=4, budget=budget, seed=1
-            )
-        owner, weights = np.arange(texels), np.ones(texels)
-        representatives, start = None, warm_start(scores)
-    else:
-        owner, ids = np.arange(clusters), np.arange(texels) % clusters
-        weights = np.bincount(ids).astype(float)
-        pool = AbrdfPool.of_array(mean_abrdfs(AbrdfPool.of_array(abrdfs), ids, clusters))
-        representatives = np.stack(
-            [np.median(abrdfs[ids == one].astype(np.float32), axis=0) for one in range(clusters)]
+    pool = AbrdfPool.of_array(abrdfs)
+    if budget is not None:
+        pool = AbrdfPool(lambda a, b: abrdfs[a:b], texels, count, block=4, budget=budget, seed=1)
+    groups = single_texel_clusters(found.scores)
+    if clusters is not None:
+        ids = np.arange(texels, dtype=np.int32) % clusters
+        medians = [
+            np.median(abrdfs[ids == one].astype(np.float32), axis=0) for one in range(clusters)
+        ]
+        groups = AbrdfClusters(
+            ids, np.bincount(ids), np.stack(medians), warm_start(found.scores[:clusters])
         )
-        start = warm_start(scores[:clusters])
-    return TrainingData(
-        pool, owner, weights, representatives, found.mean, found.deviation,
-        direction_inputs(PAIRS), float(found.largest.max()), start,
-    )  # fmt: skip
+    scale = AbrdfScale(found.statistics.mean, found.statistics.deviation, found.alpha)
+    return training_data(pool, groups, scale, direction_inputs(PAIRS), FAST)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +102,7 @@ def data() -> TrainingData:
     return data_of()
 
 
-def assert_equal_bits(one: Trained, two: Trained) -> None:
+def assert_equal_bits(one: TrainedNetwork, two: TrainedNetwork) -> None:
     np.testing.assert_array_equal(one.latents, two.latents)
     np.testing.assert_array_equal(encoder_vector(one.encoder), encoder_vector(two.encoder))
     for name, part in decoder_arrays(one.decoder).items():
@@ -116,12 +112,16 @@ def assert_equal_bits(one: Trained, two: Trained) -> None:
     assert one.encoder_residual == two.encoder_residual
 
 
-def restored(found: Trained) -> NDArray[np.float32]:
+def restored(found: TrainedNetwork) -> NDArray[np.float32]:
     with torch.no_grad():
         grid = found.decoder.grid(
             torch.from_numpy(found.latents), torch.from_numpy(direction_inputs(PAIRS))
         )
     return grid.numpy()
+
+
+def x3_of(abrdfs: NDArray[np.floating], data: TrainingData) -> torch.Tensor:
+    return torch.from_numpy(standardised(abrdfs, data.scale.mean, data.scale.deviation))
 
 
 def rmse(one: NDArray[np.floating], two: NDArray[np.floating]) -> float:
@@ -134,7 +134,7 @@ def rmse(one: NDArray[np.floating], two: NDArray[np.floating]) -> float:
 def test_fast_training_restores_better_than_the_best_rank_2_matrix(data: TrainingData) -> None:
     plan = dataclasses.replace(FAST, steps=300, batch_texels=16, batch_images=64)
     found = train(data, plan)
-    targets = transposed(IMAGES).astype(np.float64) / data.alpha
+    targets = transposed(IMAGES).astype(np.float64) / data.scale.alpha
     matrix = targets.reshape(len(targets), -1)
     lengths = np.linalg.svd(matrix - matrix.mean(axis=0), compute_uv=False)
     best_of_rank_2 = np.sqrt(np.sum(lengths[2:] ** 2) / matrix.size)
@@ -145,7 +145,7 @@ def test_fast_training_restores_better_than_the_best_rank_2_matrix(data: Trainin
 
 def test_paper_training_lowers_the_error(data: TrainingData) -> None:
     plan = dataclasses.replace(PAPER, steps=150)
-    targets = transposed(IMAGES) / data.alpha
+    targets = transposed(IMAGES) / data.scale.alpha
     before = rmse(restored(Trainer(data, plan).result()), targets)
     assert rmse(restored(train(data, plan)), targets) < 0.6 * before
 
@@ -155,9 +155,12 @@ def test_rows_count_as_often_as_the_texels_they_stand_for() -> None:
     count = len(PAIRS.light)
     values = np.stack([np.full((count, 3), 0.2), np.full((count, 3), 1.0)]).astype(np.float16)
     flat = np.zeros((count, 3), np.float32)
+    targets = TrainingTargets(
+        AbrdfPool.of_array(values), np.zeros(2, np.int64), np.array([3.0, 1.0])
+    )
     given = TrainingData(
-        AbrdfPool.of_array(values), np.zeros(2, np.int64), np.array([3.0, 1.0]), None, flat,
-        flat + 1, direction_inputs(PAIRS), 1.0, np.zeros((1, LATENTS), np.float32),
+        targets, None, AbrdfScale(flat, flat + 1, 1.0), direction_inputs(PAIRS),
+        np.zeros((1, LATENTS), np.float32),
     )  # fmt: skip
     plan = dataclasses.replace(FAST, steps=200, batch_texels=256, batch_images=4)
     found = restored(train(given, plan))
@@ -192,10 +195,8 @@ def one_texel(texel: int = 9) -> TrainingData:
     """So that it does not matter which rows are drawn."""
     whole = data_of()
     values = transposed(IMAGES)[texel : texel + 1]
-    return dataclasses.replace(
-        whole, pool=AbrdfPool.of_array(values), owner=np.zeros(1, np.int64),
-        weights=np.ones(1), start=whole.start[texel : texel + 1],
-    )  # fmt: skip
+    targets = TrainingTargets(AbrdfPool.of_array(values), np.zeros(1, np.int64), np.ones(1))
+    return dataclasses.replace(whole, targets=targets, start=whole.start[texel : texel + 1])
 
 
 @pytest.mark.parametrize("seen", [None, 30], ids=["own", "another's"])
@@ -209,12 +210,12 @@ def test_a_step_of_the_paper_is_plain_gradient_descent(seen: int | None) -> None
     decoder = Decoder()
     decoder.load_state_dict(trainer.decoder.state_dict())
 
-    values = np.repeat(data.pool.part(0)[1], 5, axis=0)
+    values = np.repeat(data.targets.pool.part(0)[1], 5, axis=0)
     shown = values if data.representatives is None else data.representatives.repeat(5, axis=0)
-    x3 = torch.from_numpy(standardised(shown, data.mean, data.deviation))
+    x3 = x3_of(shown, data)
     latents = encoder(x3).repeat_interleave(len(PAIRS.light), dim=0)
     colours = decoder(latents, torch.from_numpy(data.directions).repeat(5, 1))
-    wanted = torch.from_numpy(values.astype(np.float32) / data.alpha).reshape(-1, 3)
+    wanted = torch.from_numpy(values.astype(np.float32) / data.scale.alpha).reshape(-1, 3)
     parts = [*encoder.parameters(), *decoder.parameters()]
     gradients = torch.autograd.grad((colours - wanted).square().mean(), parts)
 
@@ -240,9 +241,9 @@ def test_the_rate_of_the_paper_does_not_change() -> None:
 def test_the_latents_of_the_paper_are_what_the_encoder_says(data: TrainingData) -> None:
     found = train(data, PAPER)
     encoder = encoder_of(encoder_vector(found.encoder), len(PAIRS.light), WIDTHS)
-    x3 = standardised(transposed(IMAGES), data.mean, data.deviation)
+    x3 = x3_of(transposed(IMAGES), data)
     with torch.no_grad():
-        np.testing.assert_allclose(found.latents, encoder(torch.from_numpy(x3)), atol=1e-5)
+        np.testing.assert_allclose(found.latents, encoder(x3), atol=1e-5)
 
 
 def test_the_encoder_sees_the_representatives_not_the_targets() -> None:
@@ -252,8 +253,8 @@ def test_the_encoder_sees_the_representatives_not_the_targets() -> None:
     encoder = encoder_of(encoder_vector(found.encoder), len(PAIRS.light), WIDTHS)
     with torch.no_grad():
         of_medians, of_means = (
-            encoder(torch.from_numpy(standardised(seen, data.mean, data.deviation))).numpy()
-            for seen in (data.representatives, data.pool.part(0)[1])
+            encoder(x3_of(seen, data)).numpy()
+            for seen in (data.representatives, data.targets.pool.part(0)[1])
         )
     np.testing.assert_allclose(found.latents, of_medians, atol=1e-5)
     assert np.abs(of_means - of_medians).max() > 1e-3
@@ -265,7 +266,7 @@ def test_the_encoder_sees_the_representatives_not_the_targets() -> None:
 @PLANS
 @pytest.mark.parametrize("clusters", [None, 6])
 def test_a_run_that_is_stopped_and_resumed_gives_the_same_bits(
-    plan: Plan, clusters: int | None
+    plan: TrainingPlan, clusters: int | None
 ) -> None:
     data = data_of(clusters)
     total = plan.steps + plan.encoder_steps * (plan.training == "fast")
@@ -282,7 +283,7 @@ def test_a_run_that_is_stopped_and_resumed_gives_the_same_bits(
 def test_a_curve_goes_on_in_the_middle_of_a_point(
     data: TrainingData, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(training, "_CURVE_POINTS", 3)
+    monkeypatch.setattr(trainer_module, "_CURVE_POINTS", 3)
     first = Trainer(data, FAST)
     for _ in range(14):
         first.step()
@@ -292,7 +293,7 @@ def test_a_curve_goes_on_in_the_middle_of_a_point(
 def test_a_matrix_in_parts_is_resumed_with_the_same_bits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(training, "_STEPS_A_PART", 5)
+    monkeypatch.setattr(batches, "_STEPS_A_PART", 5)
     budget = 3 * 4 * len(PAIRS.light) * 3 * 2
     whole = train(data_of(budget=budget), FAST)
     first = Trainer(data_of(budget=budget), FAST)
@@ -302,7 +303,9 @@ def test_a_matrix_in_parts_is_resumed_with_the_same_bits(
 
 
 @PLANS
-def test_equal_seeds_give_equal_bits_and_others_others(data: TrainingData, plan: Plan) -> None:
+def test_equal_seeds_give_equal_bits_and_others_others(
+    data: TrainingData, plan: TrainingPlan
+) -> None:
     one = train(data, plan)
     assert_equal_bits(train(data, plan), one)
     other = train(data, dataclasses.replace(plan, seed=plan.seed + 1))
@@ -312,7 +315,7 @@ def test_equal_seeds_give_equal_bits_and_others_others(data: TrainingData, plan:
 def test_every_state_that_is_kept_can_be_resumed(
     data: TrainingData, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(training, "KEEP_SECONDS", -1.0)
+    monkeypatch.setattr(trainer_module, "KEEP_SECONDS", -1.0)
     plan = dataclasses.replace(ENCODER_FIRST, steps=10, encoder_steps=3)
     states: list[bytes] = []
     whole = train(data, plan, keep=states.append)
@@ -339,8 +342,8 @@ def test_no_state_is_kept_before_its_time(data: TrainingData) -> None:
 
 
 @PLANS
-def test_training_stops_when_it_is_told_to(data: TrainingData, plan: Plan) -> None:
-    found = train(data, plan, stop=lambda trainer: trainer.done == 7)
+def test_training_stops_when_it_is_told_to(data: TrainingData, plan: TrainingPlan) -> None:
+    found = train(data, plan, stop=lambda trainer: trainer.steps_done == 7)
     by_hand = Trainer(data, plan)
     for _ in range(7):
         by_hand.step()
@@ -367,7 +370,7 @@ def test_a_point_of_the_curve_is_the_root_of_the_mean_loss_since_the_last(
 ) -> None:
     plan = dataclasses.replace(FAST, steps=12)
     every = train(data, plan)
-    monkeypatch.setattr(training, "_CURVE_POINTS", 4)
+    monkeypatch.setattr(trainer_module, "_CURVE_POINTS", 4)
     some = train(data, plan)
     assert some.curve_step.tolist() == [3, 6, 9, 12]
     expected = np.sqrt((every.curve_rmse**2).reshape(4, 3).mean(axis=1))
@@ -389,7 +392,7 @@ def test_the_residual_is_that_of_the_stored_encoder(clusters: int | None) -> Non
     encoder = encoder_of(encoder_vector(found.encoder), len(PAIRS.light), WIDTHS)
     seen = transposed(IMAGES) if data.representatives is None else data.representatives
     with torch.no_grad():
-        said = encoder(torch.from_numpy(standardised(seen, data.mean, data.deviation))).numpy()
+        said = encoder(x3_of(seen, data)).numpy()
     away = (said - found.latents) / found.latents.std(axis=0)
     assert found.encoder_residual == pytest.approx(rmse(away, np.zeros(1)), rel=1e-3)
 
@@ -418,52 +421,21 @@ def test_a_single_latent_vector_can_be_distilled() -> None:
 # ---- warm start ------------------------------------------------------------------------------
 
 
-def test_a_warm_start_is_the_first_8_components_with_mean_0_and_deviation_1() -> None:
-    scores = np.random.default_rng(0).standard_normal((50, 11)) * 3.0 ** -np.arange(11) + 4
-    latents = warm_start(scores)
-    assert (latents.shape, latents.dtype) == ((50, LATENTS), np.float32)
-    np.testing.assert_allclose(latents.mean(axis=0), 0, atol=1e-6)
-    np.testing.assert_allclose(latents.std(axis=0), 1, rtol=1e-6)
-    for one in range(LATENTS):
-        assert np.corrcoef(latents[:, one], scores[:, one])[0, 1] == pytest.approx(1)
-
-
-def test_components_that_are_missing_or_constant_start_at_0() -> None:
-    scores = np.random.default_rng(1).standard_normal((20, 4))
-    scores[:, 2] = 0.7
-    latents = warm_start(scores)
-    deviation = latents.std(axis=0)
-    np.testing.assert_allclose(deviation[[0, 1, 3]], 1, rtol=1e-6)
-    np.testing.assert_array_equal(latents[:, [2, 4, 5, 6, 7]], 0)
-
-
-def test_one_latent_vector_starts_at_0() -> None:
-    np.testing.assert_array_equal(warm_start(np.array([[3.0, 1.0, 2.0]])), np.zeros((1, LATENTS)))
-
-
 def test_the_three_warm_starts_begin_where_they_say(data: TrainingData) -> None:
     plans: list[tuple[str, Any]] = [("pca", FAST), ("random", FAST), ("encoder", ENCODER_FIRST)]
     first = {}
     for name, plan in plans:
         trainer = Trainer(data, dataclasses.replace(plan, warm_start=name))
-        while trainer.stages[0][0] == "encoder" and trainer.done < trainer.stages[0][1]:
+        while trainer.stages[0][0] == "encoder" and trainer.steps_done < trainer.stages[0][1]:
             trainer.step()
         first[name] = trainer.latents.detach().numpy().copy()
         if name == "encoder":
-            x3 = standardised(transposed(IMAGES), data.mean, data.deviation)
+            x3 = x3_of(transposed(IMAGES), data)
             with torch.no_grad():
-                said = trainer.encoder.eval()(torch.from_numpy(x3)).numpy()
+                said = trainer.encoder.eval()(x3).numpy()
             np.testing.assert_allclose(first[name], said, atol=1e-5)
     np.testing.assert_array_equal(first["pca"], data.start)
     assert abs(first["random"].mean()) < 4 / np.sqrt(first["random"].size)
     assert first["random"].std() == pytest.approx(1, abs=0.15)
     for one, two in itertools.combinations(first.values(), 2):
         assert np.abs(one - two).max() > 0.1
-
-
-def test_stages_have_the_steps_of_the_plan() -> None:
-    assert PAPER.stages() == [("paper", 12)]
-    assert FAST.stages() == [("latents", 30)]
-    assert ENCODER_FIRST.stages() == [("encoder", 12), ("latents", 18), ("distil", 10)]
-    share_without_use = dataclasses.replace(FAST, encoder_share=0.4)
-    assert share_without_use.stages() == [("latents", 30)]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.neural_btf.pool import AbrdfPool, Read, mean_abrdfs
+from pipelines.neural_btf.abrdf_pool import AbrdfPool, AbrdfReader, mean_abrdfs
 
 IMAGES = 4
 
@@ -31,7 +31,7 @@ class Watched:
         return self.values[first:last]
 
 
-def pool_of(read: Read, rows: int, *, block: int, blocks: float, seed: int = 0) -> AbrdfPool:
+def pool_of(read: AbrdfReader, rows: int, *, block: int, blocks: float, seed: int = 0) -> AbrdfPool:
     """A pool with room for that many blocks."""
     budget = int(blocks * block * IMAGES * 3 * 2)
     return AbrdfPool(read, rows, IMAGES, block=block, budget=budget, seed=seed)

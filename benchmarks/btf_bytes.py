@@ -1,0 +1,61 @@
+"""Table 1: the bytes of stored versions of the paper's shape."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assets_defs.neural_btf.datasets import compressed_btf_dataset, compressed_btf_of
+from assets_defs.neural_btf.declaration import BTF, NONE
+from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.network import Decoder, decoder_arrays
+from storage.schemas import find_schema
+from storage.versions import Slot, VersionedStore
+
+COLUMNS = (NONE, "500", "1000", "2000")
+IMAGES = 6561
+SIDE = 100
+_PAYLOAD = ("weight", "bias", "latents", "ids")
+
+
+def table_of_bytes() -> dict[str, Any]:
+    """Payloads read back from stored versions of the paper's shape, untrained."""
+    texels = SIDE * SIDE
+    figures: dict[str, Any] = {}
+    sides = {}
+    with tempfile.TemporaryDirectory() as folder:
+        store = VersionedStore(Path(folder))
+        for column in COLUMNS:
+            dataset = compressed_btf_dataset(_untrained(texels if column == NONE else int(column)))
+            slot = Slot(BTF.name, "compressed_btf", column)
+            record = {"settings": {}, "recipe": "", "checks": []}
+            store.write(slot, find_schema(BTF.name, "compressed_btf").conform(dataset), record)
+            stored = store.open(slot).load()
+            figures[f"bytes_{column}"] = compressed_btf_of(stored).payload_bytes
+            sides[column] = _bytes_beside_payload(store.folder(slot))
+    figures["bytes_side"] = max(sides.values())
+    figures["bytes_raw_float32"] = IMAGES * texels * 3 * 4
+    figures["bytes_raw_8bit"] = IMAGES * texels * 3
+    return figures
+
+
+def _untrained(clusters: int) -> CompressedBtf:
+    random = np.random.default_rng(clusters)
+    latents = random.standard_normal((clusters, 8), dtype=np.float32)
+    ids = random.integers(0, clusters, SIDE * SIDE, dtype=np.int32)
+    return compressed_btf(decoder_arrays(Decoder()), latents, ids, 1.0, (SIDE, SIDE))
+
+
+def _bytes_beside_payload(folder: Path) -> int:
+    """Bytes of a version's files that hold no payload: metadata, alpha, the size."""
+    in_chunks = sum(
+        file.stat().st_size
+        for chunk in folder.rglob("c")
+        if chunk.parent.name.startswith(_PAYLOAD)
+        for file in ([chunk] if chunk.is_file() else chunk.rglob("*"))
+        if file.is_file()
+    )
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) - in_chunks
