@@ -35,13 +35,13 @@ from benchmarks.street_points import drawn_points
 from pipelines.drawing.stage import Stage
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
-from pipelines.street_billboards.capture.stereo import disparity_defaults, match
+from pipelines.street_billboards.capture.stereo import match_rectified_pair, opencv_disparities
 from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
 from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
 from pipelines.street_billboards.drawing.shader_street import ShaderStreet
 from pipelines.street_billboards.drawing.stage_camera import stage_camera
 from pipelines.street_billboards.textures import eigen_textures as coding
-from pipelines.street_billboards.textures.forms import SEEN, ViewTextures
+from pipelines.street_billboards.textures.texture_tables import SEEN, ViewTextures
 from storage.readers.street_photographs import motorcycle
 
 FRAMES = 100
@@ -142,10 +142,10 @@ def _some(stored: Stored, count: int) -> tuple[ViewTextures, NDArray[np.bool_]]:
 
 def _paper_form(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
     views, turns = _some(stored, PAGE)
-    paper = coding.compressed_paper(views, turns, rank=16)
+    paper = coding.compress_views_as_paper(views, turns, rank=16)
     parts = coding.byte_counts(paper)
     count = len(turns)
-    ours = coding.compressed(views, turns, error=4.4)
+    ours = coding.compress_views(views, turns, error=4.4)
     return {
         "bytes_r16": (parts["eigen"] + parts["weights"] + parts["means"]) / count,
         "bytes_r16_side": parts["scales"] / count,
@@ -166,7 +166,7 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
         rivals[name] = (figures.psnr_of_squared_errors(apart**2), size)
     curve = []
     for error in (3.0, 4.4, 5.0):
-        ours = coding.compressed(views, turns, error=error)
+        ours = coding.compress_views(views, turns, error=error)
         parts = coding.byte_counts(ours)
         psnr = coding.decode_error(views, ours)[1]
         able = {name: size for name, (quality, size) in rivals.items() if quality >= psnr}
@@ -324,8 +324,8 @@ def _speed(stored: Stored, _: dict[str, Any]) -> dict[str, Any]:
 
 def _stereo(_: Stored, __: dict[str, Any]) -> dict[str, Any]:
     pair = motorcycle()
-    found, _other = match(pair.left, pair.right, pair.most)
-    plain = disparity_defaults(pair.left, pair.right, pair.most)
+    found, _other = match_rectified_pair(pair.left, pair.right, pair.most)
+    plain = opencv_disparities(pair.left, pair.right, pair.most)
     dense = fill_disparity_holes(found.disparity, pair.left)
     return {
         "stereo_bad05_percent": 100 * figures.bad_pixel_share(dense, pair.disparity),

@@ -25,9 +25,9 @@ from assets_defs.workspace import Workspace
 from pipelines.drawing.colour import to_8bit
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
-from pipelines.street_billboards.drawing.frames import StreetStage
+from pipelines.street_billboards.drawing.street_stage import StreetStage
 from pipelines.street_billboards.textures import eigen_textures
-from pipelines.street_billboards.textures.atlases import pages
+from pipelines.street_billboards.textures.atlases import pack_pages
 from storage.versions import VersionedStore
 
 FOLDER = Path(__file__).parent / "pictures"
@@ -147,10 +147,10 @@ def _pole(store: VersionedStore) -> list[NDArray[np.uint8]]:
     plain, _ = view_textures(
         TextureSettings(sampling="plain"), lambda fraction: None, *inputs, stored("billboards")
     )
-    textures = eigen_textures.compressed(views_of(plain), made.turns, error=4.4)
+    textures = eigen_textures.compress_views(views_of(plain), made.turns, error=4.4)
     truth = stored("street_frames")["truth"].values[frame]
     pictures = [truth]
-    for packed in (pages_of(stored("texture_atlases")), pages(textures)):
+    for packed in (pages_of(stored("texture_atlases")), pack_pages(textures)):
         sky = stored("depth_maps")["sky"].values
         with StreetStage(made, packed, sky, size, supersampling=2) as stage:
             view = stage.view(drive["intrinsics"].values[1], pose)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from assets_defs.system import Progress
     from pipelines.street_billboards.capture.drive_depth import RigFrame
     from pipelines.street_billboards.capture.drive_points import DrivePoints, LoadedByFrame
-    from pipelines.street_billboards.capture.point_fusion import FrameViews
-    from pipelines.street_billboards.textures.view_textures import Photographs
+    from pipelines.street_billboards.capture.point_fusion import RgbdViews
+    from pipelines.street_billboards.textures.photographs import Photographs
     from pipelines.virtual.city.drive import SimulatedDrive
     from pipelines.virtual.city.drive_photographs import DrivePhotographs
 
@@ -136,14 +136,14 @@ def depth_dataset(
     )
 
 
-def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> FrameViews:
+def frame_views(drive: xr.Dataset, depths: xr.Dataset, taken: slice) -> RgbdViews:
     """The photographs of some frames that are not held out, one row a photograph."""
-    from pipelines.street_billboards.capture.point_fusion import FrameViews
+    from pipelines.street_billboards.capture.point_fusion import RgbdViews
 
     frames = depths["frame"].values[taken]
     cameras = drive.sizes["camera"]
     pictures = drive["photographs"].isel(frame=frames).values
-    return FrameViews(
+    return RgbdViews(
         _merged(depths["depth"][taken].values),
         _merged(depths["deviation"][taken].values),
         _merged(pictures),
@@ -178,11 +178,11 @@ def points_dataset(found: DrivePoints, gains: NDArray[np.float64]) -> xr.Dataset
     )
 
 
-def evening_codes_of(points: xr.Dataset, taken: slice) -> NDArray[np.uint8]:
+def exposure_lut_of(points: xr.Dataset, taken: slice) -> NDArray[np.uint8]:
     """Codes (photographs, 256, 3) that even out the exposures of some frames."""
-    from pipelines.street_billboards.capture.exposure import evening_codes
+    from pipelines.street_billboards.capture.exposure import exposure_lut
 
-    return evening_codes(points["gains"].values[taken].reshape(-1, 3))
+    return exposure_lut(points["gains"].values[taken].reshape(-1, 3))
 
 
 def photographs_of(
@@ -190,7 +190,7 @@ def photographs_of(
 ) -> Photographs:
     """The photographs of some frames; where a depth is not known, the one of the points."""
     from pipelines.street_billboards.capture.surface_depth import fill_unknown_depth
-    from pipelines.street_billboards.textures.view_textures import Photographs
+    from pipelines.street_billboards.textures.photographs import Photographs
 
     views = frame_views(drive, depths, taken)
     fill_unknown_depth(views, points["positions"].values, farthest=farthest)
@@ -200,5 +200,5 @@ def photographs_of(
         views.deviation,
         views.intrinsics,
         views.poses,
-        evening_codes_of(points, taken),
+        exposure_lut_of(points, taken),
     )

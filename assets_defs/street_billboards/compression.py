@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
+    from pipelines.street_billboards.textures.texture_tables import CompressedTextures, ViewTextures
 
 _LEAST_BYTES = 136
 """A billboard has a mask, a mean colour and a direction at least."""
@@ -182,9 +182,11 @@ def _compressed(
     from pipelines.street_billboards.textures import eigen_textures as coding
 
     if settings.coding == "compact":
-        return coding.compressed(views, turns, error=settings.error)
+        return coding.compress_views(views, turns, error=settings.error)
     rank = settings.rank if settings.contribution is None else None
-    return coding.compressed_paper(views, turns, rank=rank, contribution=settings.contribution)
+    return coding.compress_views_as_paper(
+        views, turns, rank=rank, contribution=settings.contribution
+    )
 
 
 # ---- texture_atlases -------------------------------------------------------------------------
@@ -260,10 +262,10 @@ def texture_atlases(
     eigen_textures: xr.Dataset,
 ) -> Result:
     """Pack the textures into pages."""
-    from pipelines.street_billboards.textures.atlases import pages
+    from pipelines.street_billboards.textures.atlases import pack_pages
 
     textures = compressed_of(eigen_textures)
-    made = pages(textures, settings.most_texels, byte_budget=settings.byte_budget)
+    made = pack_pages(textures, settings.most_texels, byte_budget=settings.byte_budget)
     used, count = sum(page.bytes for page in made), billboards.sizes["billboard"]
     way = figures.path_length(viewers(drive_frames))
     return atlases_dataset(made, textures), {

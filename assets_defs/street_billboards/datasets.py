@@ -14,7 +14,7 @@ from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.road_tiles import TiledBillboards
 from pipelines.street_billboards.street_model import StreetModel
 from pipelines.street_billboards.textures.atlases import Atlas, Page
-from pipelines.street_billboards.textures.forms import CompressedTextures, ViewTextures
+from pipelines.street_billboards.textures.texture_tables import CompressedTextures, ViewTextures
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:

@@ -51,12 +51,12 @@ def _depth_pictures(dataset: xr.Dataset) -> Pictures:
 
 def _stereo_bad(version: StoredVersion) -> float:
     """Of the real pair, whatever drive is asked for: the matching is one."""
-    from pipelines.street_billboards.capture.stereo import match
+    from pipelines.street_billboards.capture.stereo import match_rectified_pair
     from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
     from storage.readers.street_photographs import motorcycle
 
     pair = motorcycle()
-    found, _ = match(pair.left, pair.right, pair.most)
+    found, _ = match_rectified_pair(pair.left, pair.right, pair.most)
     return figures.bad_pixel_share(fill_disparity_holes(found.disparity, pair.left), pair.disparity)
 
 

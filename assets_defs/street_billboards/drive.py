@@ -135,7 +135,10 @@ def drive_frames(settings: DriveSettings, source: Source, progress: Progress) ->
 
 def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
     """A part of a user's drive, its photographs read as the store takes them."""
-    from pipelines.street_billboards.capture.centred_pictures import centred, centred_intrinsics
+    from pipelines.street_billboards.capture.centred_photographs import (
+        centre_photographs,
+        centred_intrinsics,
+    )
     from pipelines.street_billboards.capture.held_out import FEWEST_FRAMES, held_out
 
     count = len(drive.times)
@@ -148,7 +151,7 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
         )
 
     def taken(frame: int) -> NDArray[np.uint8]:
-        return centred(read_frame(drive, frame), drive.intrinsics)
+        return centre_photographs(read_frame(drive, frame), drive.intrinsics)
 
     shape = (len(drive.cameras), drive.height, drive.width, 3)
     photographs = stacked_by_frame(taken, chosen, (shape, np.uint8))

@@ -11,7 +11,7 @@ from pydantic import Field
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.street_billboards.capture_datasets import (
-    evening_codes_of,
+    exposure_lut_of,
     frame_views,
     photographs_of,
     taken_cameras,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.street_billboards.textures.view_textures import Photographs
+    from pipelines.street_billboards.textures.photographs import Photographs
 
 _ASKED_POINTS = 7
 """Every so many points are looked for in billboards."""
@@ -126,13 +126,13 @@ def billboards(
     settings: BillboardSettings, drive_frames: xr.Dataset, street_points: xr.Dataset
 ) -> Result:
     """Split space into leaves and lay a rectangle through the points of each."""
-    from pipelines.street_billboards.billboards import laid_through
+    from pipelines.street_billboards.billboards import fit_billboards
     from pipelines.street_billboards.octree import octree_leaves
     from pipelines.street_billboards.road_tiles import TiledBillboards, by_tile
 
     positions = street_points["positions"].values
     leaves = octree_leaves(positions, settings.voxel, settings.least_points)
-    made = laid_through(
+    made = fit_billboards(
         leaves, positions, taken_cameras(drive_frames), all_turn=settings.planes == "turning"
     )
     road = TiledBillboards(*by_tile(made, viewers(drive_frames)), leaves.side, leaves.depth)
@@ -182,7 +182,7 @@ def _sampling_error(version: StoredVersion) -> float:
         billboards_of(stored.isel(billboard=own)),
         views_of_rows(version.dataset, own),
         frame_views(version.input("drive_frames"), version.input("depth_maps"), frames),
-        evening_codes_of(version.input("street_points"), frames),
+        exposure_lut_of(version.input("street_points"), frames),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import Cameras, project_points
-from pipelines.street_billboards.octree import Leaves, neighbours
+from pipelines.street_billboards.octree import Leaves, neighbouring_leaves
 from pipelines.street_billboards.textures.view_directions import CIRCLE, DIRECTIONS, SPACING
 
 OVERLAP = 0.03
@@ -38,7 +38,7 @@ class Billboards(NamedTuple):
     """b rectangles in the world, in metres.
 
     One turns about its centre to face the viewer: its normal is from the centre to the eye, its row
-    axis is horizontal (``turned_axes``). One whose points lie in a plane stands still. Texture
+    axis is horizontal (``axes_facing``). One whose points lie in a plane stands still. Texture
     coordinates (s, t) in [-1, 1] are ``centre + s * half_s + t * half_t``.
     """
 
@@ -56,7 +56,7 @@ class Billboards(NamedTuple):
     """(b,), first direction of the fan of views, 0 to 59."""
 
 
-def turned_axes(
+def axes_facing(
     centre: NDArray[np.floating], eye: NDArray[np.floating]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors of rows and columns, (…, 3) each, of squares at ``centre`` that face ``eye``."""
@@ -67,7 +67,7 @@ def turned_axes(
     return row, np.cross(normal, row)
 
 
-def laid_through(
+def fit_billboards(
     leaves: Leaves,
     positions: NDArray[np.floating],
     cameras: Cameras,
@@ -78,6 +78,15 @@ def laid_through(
 
     positions (n, 3): the points that the leaves hold; cameras: that saw them. all_turn: as in the
     paper.
+
+    >>> from pipelines.street_billboards.octree import octree_leaves
+    >>> wall = np.random.default_rng(0).uniform([0, 0, 0], [2, 0.01, 2], (2000, 3))
+    >>> lens = np.array([[50.0, 0, 50], [0, 50, 50], [0, 0, 1]])
+    >>> north = np.array([[1.0, 0, 0, 1], [0, 0, 1, -3], [0, -1, 0, 1], [0, 0, 0, 1]])
+    >>> seen = Cameras(lens[None], north[None], width=101, height=101)
+    >>> billboards = fit_billboards(octree_leaves(wall, 1.0, 10), wall, seen)
+    >>> billboards.centre.shape, int(billboards.turns.sum())
+    ((4, 3), 0)
     """
     middle = leaves.middle
     towards = _towards_viewers(middle, cameras)
@@ -145,7 +154,7 @@ def _planes(
     _, axes = np.linalg.eigh(own.covariance)
     normal = axes[:, :, 0]
     # Stereo noise tilts the plane of one voxel: neighbours that agree lend their points.
-    beside = neighbours(leaves.cell)
+    beside = neighbouring_leaves(leaves.cell)
     there = np.maximum(beside, 0)
     like = np.abs(np.einsum("bi,bki->bk", normal, normal[there])) > np.cos(
         np.radians(_LIKE_DEGREES)

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import figures
-from pipelines.street_billboards.drawing.frames import StreetStage, compared, flight
+from pipelines.street_billboards.drawing.street_stage import (
+    StreetStage,
+    flight_poses,
+    shader_and_processor_pictures,
+)
 from pipelines.street_billboards.figures import ImageMetrics
 from pipelines.street_billboards.street_model import StreetModel
 
@@ -82,7 +86,7 @@ def viewpoints(
     held = poses[held_out]
     beside = np.array([[moved_left(pose, offset) for offset in offsets] for pose in held])
     return Viewpoints(
-        intrinsics, size, held, beside, flight(poses[_UNSEEN:], flight_frames, swerve)
+        intrinsics, size, held, beside, flight_poses(poses[_UNSEEN:], flight_frames, swerve)
     )
 
 
@@ -132,7 +136,7 @@ def draw_frames(
     compare = list(zip(shown[:held], truth, seen[:held], strict=True))
     rendered = np.stack([figures.match_exposure(*one) for one in compare])
     judged = zip(rendered, truth, seen[:held], strict=True)
-    shaded, decoded = compared(
+    shaded, decoded = shader_and_processor_pictures(
         street.billboards,
         street.pages,
         street.textures,

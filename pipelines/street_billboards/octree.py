@@ -42,6 +42,11 @@ def octree_leaves(positions: NDArray[np.floating], side: float, least: int) -> L
     its corner on a multiple of ``side``. least: points that a leaf must hold.
 
     Raises ValueError where there are no points, or more than 20 levels would be needed.
+
+    >>> points = np.random.default_rng(0).uniform(0, 2, (1000, 3))
+    >>> leaves = octree_leaves(points, side=0.5, least=5)
+    >>> leaves.depth, leaves.cell.shape, len(leaves.order)
+    (2, (64, 3), 1000)
     """
     if len(positions) == 0:
         raise ValueError("points: found none; expected some to put an octree around.")
@@ -78,7 +83,7 @@ def morton_codes(cell: NDArray[np.int64]) -> NDArray[np.int64]:
     return code
 
 
-def neighbours(cell: NDArray[np.int64]) -> NDArray[np.int64]:
+def neighbouring_leaves(cell: NDArray[np.int64]) -> NDArray[np.int64]:
     """The 27 leaves around each leaf, itself in the middle: (b, 27) rows of ``cell``, or -1."""
     code = morton_codes(cell)
     steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.textures.atlases import Page
-from pipelines.street_billboards.textures.forms import CompressedTextures
+from pipelines.street_billboards.textures.texture_tables import CompressedTextures
 
 
 class StreetModel(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import Cameras, unproject_depth
-from pipelines.street_billboards.billboards import laid_through
+from pipelines.street_billboards.billboards import fit_billboards
 from pipelines.street_billboards.capture import stereo
 from pipelines.street_billboards.capture.drive_depth import RigFrame, open_to_sky, sky_views
 from pipelines.street_billboards.capture.drive_points import (
@@ -16,15 +16,16 @@ from pipelines.street_billboards.capture.drive_points import (
     drive_gains,
     drive_points,
 )
-from pipelines.street_billboards.capture.exposure import evening_codes
-from pipelines.street_billboards.capture.point_fusion import FrameViews
+from pipelines.street_billboards.capture.exposure import exposure_lut
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
 from pipelines.street_billboards.capture.sky import SkyView, sky_map
 from pipelines.street_billboards.capture.surface_depth import fill_unknown_depth
 from pipelines.street_billboards.octree import octree_leaves
 from pipelines.street_billboards.street_model import StreetModel
-from pipelines.street_billboards.textures.atlases import pages
-from pipelines.street_billboards.textures.eigen_textures import compressed
-from pipelines.street_billboards.textures.view_textures import Photographs, view_textures
+from pipelines.street_billboards.textures.atlases import pack_pages
+from pipelines.street_billboards.textures.eigen_textures import compress_views
+from pipelines.street_billboards.textures.photographs import Photographs
+from pipelines.street_billboards.textures.view_textures import view_textures
 
 FloatArray = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def street_of_frames(
     alone = len(frames) == 1
     positions = _every_point(views) if alone else drive_points(drive).points.positions
     leaves = octree_leaves(positions, voxel, least_points)
-    billboards = laid_through(
+    billboards = fit_billboards(
         leaves, positions, Cameras(views.intrinsics, views.poses, width, height)
     )
     gains = drive_gains(positions, drive, cameras, farthest=farthest)
@@ -63,35 +64,35 @@ def street_of_frames(
         views.deviation,
         views.intrinsics,
         views.poses,
-        evening_codes(gains.reshape(-1, 3)),
+        exposure_lut(gains.reshape(-1, 3)),
     )
     sampled = view_textures(billboards, leaves.side, photographs, farthest=farthest)
-    textures = compressed(sampled, billboards.turns, error=error)
-    return StreetModel(billboards, pages(textures), textures, sky)
+    textures = compress_views(sampled, billboards.turns, error=error)
+    return StreetModel(billboards, pack_pages(textures), textures, sky)
 
 
 def _with_depth(
     frames: Sequence[RigFrame], nearest: float, farthest: float
-) -> tuple[FrameViews, NDArray[np.float32]]:
+) -> tuple[RgbdViews, NDArray[np.float32]]:
     """All photographs with their depths, frame by frame, and the sky behind them."""
     views, skies = [], list[SkyView]()
     for frame in frames:
         maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
         skies += sky_views(frame, maps)
-        views.append(FrameViews(maps.depth, maps.deviation, *frame))
-    joined = FrameViews._make(
-        np.concatenate([getattr(view, name) for view in views]) for name in FrameViews._fields
+        views.append(RgbdViews(maps.depth, maps.deviation, *frame))
+    joined = RgbdViews._make(
+        np.concatenate([getattr(view, name) for view in views]) for name in RgbdViews._fields
     )
     return joined._replace(depth=open_to_sky(skies)), sky_map(skies)
 
 
-def _some(views: FrameViews, taken: slice, cameras: int) -> FrameViews:
+def _some(views: RgbdViews, taken: slice, cameras: int) -> RgbdViews:
     """The photographs of some frames with so many cameras each."""
     rows = slice(taken.start * cameras, taken.stop * cameras)
-    return FrameViews._make(values[rows] for values in views)
+    return RgbdViews._make(values[rows] for values in views)
 
 
-def _every_point(views: FrameViews) -> FloatArray:
+def _every_point(views: RgbdViews) -> FloatArray:
     """World positions (n, 3) of all pixels whose depth is known."""
     places = []
     for lens, pose, depth in zip(views.intrinsics, views.poses, views.depth, strict=True):

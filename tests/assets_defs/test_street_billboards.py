@@ -17,9 +17,9 @@ from assets_defs.street_billboards.datasets import compressed_of, pages_of, view
 from assets_defs.street_billboards.graph import STREET
 from pipelines.street_billboards import billboards, figures, octree
 from pipelines.street_billboards.capture import exposure, point_fusion, stereo
-from pipelines.street_billboards.drawing import culling, frames, processor_street, quads
+from pipelines.street_billboards.drawing import culling, processor_street, quads, street_stage
 from pipelines.street_billboards.textures import atlases, eigen_textures, view_textures
-from pipelines.street_billboards.textures.forms import SEEN
+from pipelines.street_billboards.textures.texture_tables import SEEN
 from pipelines.virtual.city import drive as city_drive
 from pipelines.virtual.city import drive_photographs
 from tests.assets_defs.regressions import Regression, assert_check_finds
@@ -59,7 +59,7 @@ def test_held_out_frames_feed_nothing_but_the_judgement(good: Any) -> None:
 def test_stored_textures_and_pages_read_back(good: Any) -> None:
     textures = compressed_of(_open(good, "eigen_textures"))
     pages = pages_of(_open(good, "texture_atlases"))
-    again = atlases.pages(textures)
+    again = atlases.pack_pages(textures)
     assert len(pages) == len(again)
     for stored, packed in zip(pages, again, strict=True):
         for name in ("detail", "tint"):
@@ -323,36 +323,38 @@ REGRESSIONS = (
     Regression("stereo_bad05", stereo, "refined", _off_by_a_pixel, KEYS),
     Regression("depth_error", stereo, "depth_maps", _deeper, KEYS),
     Regression("known_share", stereo, "depth_maps", _half_unknown, KEYS),
-    Regression("agreement", point_fusion, "agreement", lambda right, *a: 0.5 * right(*a), KEYS),
-    Regression("points_a_metre", point_fusion, "fused", _some, KEYS),
-    Regression("stray_share", point_fusion, "fused", _nearer, KEYS),
+    Regression(
+        "agreement", point_fusion, "photometric_agreement", lambda right, *a: 0.5 * right(*a), KEYS
+    ),
+    Regression("points_a_metre", point_fusion, "fuse_points", _some, KEYS),
+    Regression("stray_share", point_fusion, "fuse_points", _nearer, KEYS),
     Regression(
         "largest_gain", exposure, "exposure_gains", lambda right, *a: right(*a) ** 2 * 1.2, KEYS
     ),
     Regression("points_in", octree, "octree_leaves", _sparse, KEYS),
-    Regression("off_plane", billboards, "laid_through", _tilted, KEYS),
+    Regression("off_plane", billboards, "fit_billboards", _tilted, KEYS),
     Regression(
         "still_share",
         billboards,
-        "laid_through",
+        "fit_billboards",
         lambda right, *a, **o: right(*a, **(o | {"all_turn": True})),
         KEYS,
     ),
     Regression("seen_share", view_textures, "view_textures", _half_seen, KEYS),
     Regression("sampling_error", view_textures, "view_textures", _mirrored, KEYS),
     Regression("views_each", view_textures, "view_textures", _one_view, KEYS),
-    Regression("over_budget", eigen_textures, "compressed", _asked_for(1.6), KEYS),
+    Regression("over_budget", eigen_textures, "compress_views", _asked_for(1.6), KEYS),
     Regression("sampled_rmse", eigen_textures, "decode_error", _half_the_error, KEYS),
-    Regression("byte_share", eigen_textures, "compressed", _asked_for(0.4), KEYS),
-    Regression("excess_rank", eigen_textures, "compressed", _too_many, KEYS),
-    Regression("unpacked_error", atlases, "pages", _wrong_tile, KEYS),
-    Regression("bytes_a_metre", atlases, "pages", _bytes(2.0, "bytes"), KEYS),
-    Regression("padding_share", atlases, "pages", _bytes(1.0, "padding"), KEYS),
-    Regression("coverage", quads, "visible", _few_seen, KEYS),
+    Regression("byte_share", eigen_textures, "compress_views", _asked_for(0.4), KEYS),
+    Regression("excess_rank", eigen_textures, "compress_views", _too_many, KEYS),
+    Regression("unpacked_error", atlases, "pack_pages", _wrong_tile, KEYS),
+    Regression("bytes_a_metre", atlases, "pack_pages", _bytes(2.0, "bytes"), KEYS),
+    Regression("padding_share", atlases, "pack_pages", _bytes(1.0, "padding"), KEYS),
+    Regression("coverage", quads, "visible_billboards", _few_seen, KEYS),
     Regression("held_out_psnr", figures, "match_exposure", _wrong_exposure, KEYS),
     Regression("held_out_ssim", figures, "match_exposure", _shaken, KEYS),
     Regression("held_out_flip", figures, "match_exposure", _shaken, KEYS),
-    Regression("shader_difference", processor_street, "decoded_views", _paler, KEYS),
+    Regression("shader_difference", processor_street, "decode_views", _paler, KEYS),
 )
 
 
@@ -399,7 +401,7 @@ def test_bad_settings_are_refused_before_any_work(
 def test_an_atlas_that_does_not_fit_says_its_bytes(good: Any) -> None:
     textures = compressed_of(_open(good, "eigen_textures"))
     with pytest.raises(ValueError, match=r"would take \d+ bytes; expected 200000"):
-        atlases.pages(textures, byte_budget=200_000)
+        atlases.pack_pages(textures, byte_budget=200_000)
 
 
 def test_culled_billboards_are_out_of_the_picture(good: Any) -> None:
@@ -411,7 +413,9 @@ def test_culled_billboards_are_out_of_the_picture(good: Any) -> None:
     size = (drive.sizes["x"], drive.sizes["y"])
     made = billboards_of(_open(good, "billboards"))
     sky = _open(good, "depth_maps")["sky"].values
-    with frames.StreetStage(made, pages_of(_open(good, "texture_atlases")), sky, size) as stage:
+    with street_stage.StreetStage(
+        made, pages_of(_open(good, "texture_atlases")), sky, size
+    ) as stage:
         view = stage.view(lens, pose)
     assert view.billboards < len(made.centre)
-    assert len(culling.visible(made, lens, pose, *size)) >= view.billboards
+    assert len(culling.visible_billboards(made, lens, pose, *size)) >= view.billboards

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.street_billboards.capture import stereo
 from pipelines.street_billboards.capture.drive_depth import RigFrame
-from pipelines.street_billboards.capture.point_fusion import FrameViews, agreement
+from pipelines.street_billboards.capture.point_fusion import RgbdViews, photometric_agreement
 
 LEAST_AGREEMENT = 0.3
 """Share of points that neighbouring frames confirm; wrong calibrations leave a tenth."""
@@ -17,16 +17,16 @@ LEAST_AGREEMENT = 0.3
 def neighbours_agreement(frames: Sequence[RigFrame]) -> float:
     """Share of the second frame's textured pixels that the first and the third confirm.
 
-    See ``point_fusion.agreement``; depth is found for this alone. Raises ValueError as
+    See ``point_fusion.photometric_agreement``; depth is found for this alone. Raises ValueError as
     ``stereo.depth_maps`` does.
     """
     before, here, after = (_views(frame) for frame in frames)
-    beside = FrameViews._make(
-        np.concatenate([getattr(before, name), getattr(after, name)]) for name in FrameViews._fields
+    beside = RgbdViews._make(
+        np.concatenate([getattr(before, name), getattr(after, name)]) for name in RgbdViews._fields
     )
-    return agreement(here, beside)
+    return photometric_agreement(here, beside)
 
 
-def _views(frame: RigFrame) -> FrameViews:
+def _views(frame: RigFrame) -> RgbdViews:
     maps = stereo.depth_maps(*frame)
-    return FrameViews(maps.depth, maps.deviation, *frame)
+    return RgbdViews(maps.depth, maps.deviation, *frame)

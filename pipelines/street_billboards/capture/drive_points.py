@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.capture import exposure, point_fusion
-from pipelines.street_billboards.capture.point_fusion import FrameViews, Points
-from pipelines.street_billboards.textures.observations import observed
+from pipelines.street_billboards.capture.observations import observe_points
+from pipelines.street_billboards.capture.point_fusion import Points, RgbdViews
 
 _AROUND = 3
 """Frames before and after one that are asked to confirm it."""
@@ -22,7 +22,7 @@ class LoadedByFrame(NamedTuple):
     """The frames of a drive, loaded when they are asked for."""
 
     frames: int
-    load: Callable[[slice], FrameViews]
+    load: Callable[[slice], RgbdViews]
     """Photographs of some frames with their depths, one row a photograph."""
 
 
@@ -66,7 +66,7 @@ def drive_points(
             frame = drive.load(slice(number, number + 1))
             neighbours = drive.load(slice(max(number - _AROUND, 0), number + _AROUND + 1))
             if number in asked:
-                agreement[number] = point_fusion.agreement(frame, neighbours)
+                agreement[number] = point_fusion.photometric_agreement(frame, neighbours)
             yield point_fusion.consistent_points(
                 frame,
                 neighbours,
@@ -75,7 +75,7 @@ def drive_points(
                 step=fusion.step,
             )
 
-    points = point_fusion.fused(parts(), fusion.cell)
+    points = point_fusion.fuse_points(parts(), fusion.cell)
     if len(points.positions) == 0:
         raise ValueError(
             "street_points: no point is confirmed by other frames; expected consistent intrinsics "
@@ -92,7 +92,7 @@ def drive_gains(
     Factors of linear light, about 1; farthest: metres from a camera that a point may be.
     """
     seen = [
-        observed(positions, drive.load(slice(number, number + 1)), farthest=farthest).shifted(
+        observe_points(positions, drive.load(slice(number, number + 1)), farthest=farthest).shifted(
             number * cameras
         )
         for number in range(drive.frames)

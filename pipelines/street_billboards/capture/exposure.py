@@ -24,6 +24,11 @@ def exposure_gains(
     log radiance = log point + log gain in the least absolute sense beyond small differences; what
     reflects differs from view to view. The gains' logarithms have the mean 0. Photographs that
     share no point with others have a gain of 1.
+
+    >>> seen = np.array([[0.1], [0.2], [0.3], [0.6]])
+    >>> gains = exposure_gains(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1]), seen, 2)
+    >>> np.round(gains[1] / gains[0], 3)
+    array([2.])
     """
     logs = np.log(np.asarray(radiance, np.float64))
     gains = np.zeros((photographs, logs.shape[1]))
@@ -64,8 +69,12 @@ def _shared(
     return np.asarray((by_point.T @ scaled).toarray())
 
 
-def evening_codes(gains: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Codes (…, 256, channels): what each sRGB code would be at a gain (…, channels) of 1."""
+def exposure_lut(gains: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Codes (…, 256, channels): what each sRGB code would be at a gain (…, channels) of 1.
+
+    >>> exposure_lut(np.array([1.0, 2.0, 0.5]))[128]
+    array([128,  92, 176], dtype=uint8)
+    """
     linear = decode_srgb(np.arange(256) / 255.0)
     evened = linear[:, None] / np.asarray(gains)[..., None, :]
     return np.rint(encode_srgb(evened) * 255.0).astype(np.uint8)

@@ -52,7 +52,7 @@ class Points(NamedTuple):
     """(n,), inverse variance of the position, 1 / m²; of cells, the sum."""
 
 
-class FrameViews(NamedTuple):
+class RgbdViews(NamedTuple):
     """k photographs with their depths and cameras."""
 
     depth: Map
@@ -71,8 +71,8 @@ class FrameViews(NamedTuple):
 
 
 def consistent_points(
-    frame: FrameViews,
-    neighbours: FrameViews,
+    frame: RgbdViews,
+    neighbours: RgbdViews,
     *,
     least_support: int = 2,
     farthest: float = 25.0,
@@ -82,7 +82,7 @@ def consistent_points(
 
     Views of ``neighbours`` that stand where one of the frame's does are not asked: they would
     confirm their own errors. farthest: metres along the axis; step: every step-th row and column
-    has points. Wrong intrinsics or poses leave many, wrong ones: ``agreement`` tells.
+    has points. Wrong intrinsics or poses leave many, wrong ones: ``photometric_agreement`` tells.
     """
     parts = []
     for i in range(len(frame.depth)):
@@ -105,7 +105,7 @@ def consistent_points(
     return _joined(parts)
 
 
-def agreement(frame: FrameViews, neighbours: FrameViews) -> float:
+def photometric_agreement(frame: RgbdViews, neighbours: RgbdViews) -> float:
     """Share of a frame's textured pixels up to 20 m that other frames confirm where they look.
 
     Same depth within 4 %, and it looks alike there. 0.5 to 0.8 with right intrinsics and poses,
@@ -127,7 +127,7 @@ def agreement(frame: FrameViews, neighbours: FrameViews) -> float:
     return agree / asked if asked else 0.0
 
 
-def _others(views: FrameViews, frame: FrameViews, camera: int) -> NDArray[np.int64]:
+def _others(views: RgbdViews, frame: RgbdViews, camera: int) -> NDArray[np.int64]:
     """Views but the frame's own, first those around what the camera sees best: they know most."""
     apart = np.abs(views.poses[:, None] - frame.poses[None]).max(axis=(2, 3)).min(axis=1)
     others = np.flatnonzero(apart > 1e-9)
@@ -136,13 +136,13 @@ def _others(views: FrameViews, frame: FrameViews, camera: int) -> NDArray[np.int
     return others[np.argsort(away, kind="stable")]
 
 
-def _camera(views: FrameViews, number: int) -> tuple[FloatArray, FloatArray]:
+def _camera(views: RgbdViews, number: int) -> tuple[FloatArray, FloatArray]:
     """Lens (4,) and pose (4, 4) of one."""
     pose = np.ascontiguousarray(views.poses[number], dtype=np.float64)
     return _lenses(views.intrinsics[number : number + 1])[0], pose
 
 
-def _cameras(views: FrameViews, chosen: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _cameras(views: RgbdViews, chosen: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     """Lenses (k, 4) and what takes the world to the cameras' axes (k, 4, 4)."""
     poses = np.asarray(views.poses[chosen], np.float64)
     return _lenses(views.intrinsics[chosen]), np.asarray(np.linalg.inv(poses), np.float64)
@@ -168,7 +168,7 @@ def _joined(parts: list[Points]) -> Points:
 # ---- a drive ---------------------------------------------------------------------------------
 
 
-def fused(parts: Iterable[Points], cell: float = 0.05) -> Points:
+def fuse_points(parts: Iterable[Points], cell: float = 0.05) -> Points:
     """The union of many frames' points, one for each cell of ``cell`` metres, without outliers.
 
     Positions, colours and normals are means by weight. Those that fewer than ten others accompany

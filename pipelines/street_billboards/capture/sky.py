@@ -126,15 +126,20 @@ def sky_along(sky: NDArray[np.float32], rays: FloatArray) -> NDArray[np.float32]
     )
 
 
-def rays_of(intrinsics: FloatArray, to_world: FloatArray, width: int, height: int) -> FloatArray:
-    """Unit vectors (height, width, 3) in the world along which a camera's pixels look."""
+def pixel_rays(intrinsics: FloatArray, to_world: FloatArray, width: int, height: int) -> FloatArray:
+    """Unit vectors (height, width, 3) in the world along which a camera's pixels look.
+
+    >>> lens = np.array([[2.0, 0, 2], [0, 2, 1], [0, 0, 1]])
+    >>> pixel_rays(lens, np.eye(4), width=5, height=3)[1, 2]
+    array([0., 0., 1.])
+    """
     rays = unproject_depth(intrinsics, to_world, np.ones((height, width))) - to_world[:3, 3]
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
 
 
 def _rays(view: SkyView) -> FloatArray:
     height, width = view.depth.shape
-    return rays_of(view.intrinsics, view.to_world, width, height)
+    return pixel_rays(view.intrinsics, view.to_world, width, height)
 
 
 def _clear(view: SkyView) -> NDArray[np.bool_]:

@@ -65,7 +65,7 @@ class _Inverse(NamedTuple):
 # ---- a rectified pair ------------------------------------------------------------------------
 
 
-def match(
+def match_rectified_pair(
     left: Photograph, right: Photograph, most: int, *, fine: bool = True
 ) -> tuple[DisparityMap, DisparityMap]:
     """Disparities of the left and of the right photograph of a rectified pair.
@@ -93,7 +93,7 @@ def match(
     return answer[0], answer[1]
 
 
-def disparity_defaults(left: Photograph, right: Photograph, most: int) -> Map:
+def opencv_disparities(left: Photograph, right: Photograph, most: int) -> Map:
     """Disparities (h, w) of the left photograph by OpenCV with its default parameters."""
     matcher = cv2.StereoSGBM.create()
     matcher.setNumDisparities(_rounded(most))
@@ -198,8 +198,8 @@ def depth_maps(
     photographs (c, h, w, 3) sRGB, of exposures that may differ; intrinsics (c, 3, 3) in pixels,
     poses (c, 4, 4) to the world, metres. Neighbours are matched, turned parallel where they are
     not; then each camera's disparities are refined with all others. nearest, farthest: metres;
-    nothing nearer is looked for. fine: as for ``match``. Raises ValueError for fewer than two
-    cameras and for neighbours that do not stand beside each other.
+    nothing nearer is looked for. fine: as for ``match_rectified_pair``. Raises ValueError for fewer
+    than two cameras and for neighbours that do not stand beside each other.
     """
     lenses: FloatArray = np.array(intrinsics, np.float64)
     places: FloatArray = np.array(poses, np.float64)

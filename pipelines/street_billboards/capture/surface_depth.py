@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture.point_fusion import FrameViews
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _BEYOND = 10.0
 """Metres beyond the farthest billboard, of points that may lie behind it."""
 
 
-def fill_unknown_depth(views: FrameViews, positions: FloatArray, *, farthest: float) -> None:
+def fill_unknown_depth(views: RgbdViews, positions: FloatArray, *, farthest: float) -> None:
     """Give pixels without a depth the one of the street's points (n, 3), in place.
 
     inf where there are none, with a standard deviation of 0.1 m; farthest: metres from a camera to

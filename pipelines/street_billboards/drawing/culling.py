@@ -20,7 +20,7 @@ _SLACK = 1e-4
 """Metres: what is placed in float32 may be so far off."""
 
 
-def visible(
+def visible_billboards(
     billboards: Billboards,
     intrinsics: NDArray[np.floating],
     to_world: NDArray[np.floating],
@@ -72,7 +72,7 @@ def _distances(
     planes: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None:
-    """Squared distances of the centres, -1 for what is outside; axes as ``turned_axes``."""
+    """Squared distances of the centres, -1 for what is outside; axes as ``axes_facing``."""
     for row in range(len(centre)):
         x, y, z = centre[row, 0] - eye[0], centre[row, 1] - eye[1], centre[row, 2] - eye[2]
         sx, sy, sz = half_s[row, 0], half_s[row, 1], half_s[row, 2]

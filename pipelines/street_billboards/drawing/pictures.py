@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.textures.atlases import Page
-from pipelines.street_billboards.textures.forms import (
+from pipelines.street_billboards.textures.texture_tables import (
     SEEN,
     SIDE,
     CompressedTextures,

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.graphics_driver import largest_texture
 from pipelines.drawing.stage import surface, texture
-from pipelines.street_billboards.billboards import Billboards, turned_axes
+from pipelines.street_billboards.billboards import Billboards, axes_facing
 from pipelines.street_billboards.drawing.quads import QUAD, quads_in_view, send_quads
 from pipelines.street_billboards.textures.atlases import MOST_TEXELS
-from pipelines.street_billboards.textures.decoding import Decodable, decodable, decoded_views
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.decoding import Decodable, decodable, decode_views
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 from pipelines.street_billboards.textures.view_directions import fan_position
 
 _CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -104,7 +104,7 @@ class _Tiles:
             tiles = self._texels[row * SIDE : (row + 1) * SIDE]
             tiles = tiles.reshape(SIDE, self._columns, SIDE, 4).transpose(1, 0, 2, 3)
             count = len(chosen[part])
-            decoded_views(textures, chosen[part], position[part], tiles[:count])
+            decode_views(textures, chosen[part], position[part], tiles[:count])
         data = self._image.GetInput()
         data.SetDimensions(shape[1], shape[0], 1)
         data.GetPointData().SetScalars(numpy_to_vtk(self._texels.reshape(-1, 4), deep=False))
@@ -119,7 +119,7 @@ def _corners(
 ) -> NDArray[np.float32]:
     """(4 k, 3), in metres."""
     centre, turns = billboards.centre[chosen], billboards.turns[chosen, None]
-    row, column = turned_axes(centre, eye)
+    row, column = axes_facing(centre, eye)
     half_s, half_t = billboards.half_s[chosen], billboards.half_t[chosen]
     half_s = np.where(turns, row * half_s[:, :1], half_s)
     half_t = np.where(turns, column * half_t[:, 2:], half_t)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.billboards import Billboards
-from pipelines.street_billboards.drawing.culling import visible
+from pipelines.street_billboards.drawing.culling import visible_billboards
 from pipelines.street_billboards.drawing.stage_camera import check_middle
 
 QUAD = np.array([0, 1, 2, 0, 2, 3])
@@ -30,7 +30,7 @@ def quads_in_view(
     """
     check_middle("column", float(intrinsics[0, 2]), width)
     check_middle("row", float(intrinsics[1, 2]), height)
-    seen = visible(billboards, intrinsics, to_world, width, height)
+    seen = visible_billboards(billboards, intrinsics, to_world, width, height)
     return seen[drawable[seen]]
 
 

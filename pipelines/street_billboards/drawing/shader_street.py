@@ -28,17 +28,17 @@ from pipelines.drawing.graphics_driver import largest_texture
 from pipelines.drawing.stage import surface, texture
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.drawing.quads import QUAD, quads_in_view, send_quads
-from pipelines.street_billboards.textures.atlases import MOST_TEXELS, Page, pages
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.atlases import MOST_TEXELS, Page, pack_pages
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 
 
 class ShaderStreet:
     """Billboards with textures that the shader decodes.
 
-    textures: of the same b billboards, or as ``atlases.pages`` packed them. most_texels: of a
+    textures: of the same b billboards, or as ``atlases.pack_pages`` packed them. most_texels: of a
     texture's side, where they are still to be packed; less where the driver has less. ``actors``
-    are for ``Stage.add``, one a page (``pages``); nothing shows before ``look``. Raises ValueError
-    as ``atlases.pages``, and for pages that the driver cannot hold or of other billboards.
+    are for ``Stage.add``, one a page; nothing shows before ``look``. Raises ValueError as
+    ``atlases.pack_pages``, and for pages that the driver cannot hold or of other billboards.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class ShaderStreet:
     ) -> None:
         most = largest_texture()
         if isinstance(textures, CompressedTextures):
-            textures = pages(textures, min(most_texels, most))
+            textures = pack_pages(textures, min(most_texels, most))
         self.pages = list(textures)
         _check_pages(self.pages, len(billboards.centre), most)
         self._billboards = billboards

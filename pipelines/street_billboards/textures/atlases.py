@@ -7,7 +7,7 @@ is the top of a billboard's texture. Nothing is mipmapped.
 2 (Co and Cg, or G and B), in tiles of side x side texels. A tile holds four planes, one a channel:
 slot n is channel n % 4 of tile n // 4, tiles lie in rows. The planes of one billboard are
 consecutive slots, in tint those of channel 1 before those of channel 2; billboards are put in such
-an order that few reach into a tile more than they need (``arranged``), and no slot stays free but
+an order that few reach into a tile more than they need (``pack_slots``), and no slot stays free but
 in the last row of tiles. What a tile adds to a channel is the product of its sample and four
 weights, zero for planes of other billboards.
 
@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 
 MOST_TEXELS = 8192
 """Texels of a texture's side (the paper's)."""
@@ -100,11 +100,14 @@ class _Plan(NamedTuple):
     """(rows, columns) of tiles in detail and tint, texels in views, masks in masks."""
 
 
-def arranged(ranks: NDArray[np.integer]) -> NDArray[np.int64]:
+def pack_slots(ranks: NDArray[np.integer]) -> NDArray[np.int64]:
     """First slots (p,) of billboards with so many planes each (p,); no slot between stays free.
 
     Planes that do not fill tiles share them where they complete each other, three and one, two and
     two: none but some of what is three too many reaches into one tile more than it has to.
+
+    >>> pack_slots(np.array([3, 4, 1, 2]))
+    array([4, 0, 7, 8])
     """
     rest = ranks % 4
     threes, ones = np.flatnonzero(rest == 3), np.flatnonzero(rest == 1)
@@ -123,7 +126,7 @@ def arranged(ranks: NDArray[np.integer]) -> NDArray[np.int64]:
     return first
 
 
-def pages(
+def pack_pages(
     textures: CompressedTextures, most: int = MOST_TEXELS, *, byte_budget: int | None = None
 ) -> list[Page]:
     """Pack compressed textures into pages, in the order of the billboards.
@@ -194,7 +197,7 @@ def _planned(
     own = slots[start:stop]
     firsts, tiles, sheets = [], [], []
     for ranks in own.T:
-        first = arranged(ranks)
+        first = pack_slots(ranks)
         reached = np.where(ranks, (first % 4 + ranks + 3) // 4, 0)
         firsts.append(first)
         tiles.append(reached)

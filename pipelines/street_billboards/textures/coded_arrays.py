@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.forms import CompressedTextures
+from pipelines.street_billboards.textures.texture_tables import CompressedTextures
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]

@@ -14,13 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.textures.coded_arrays import offsets
-from pipelines.street_billboards.textures.forms import (
+from pipelines.street_billboards.textures.plane_resolution import sample_places
+from pipelines.street_billboards.textures.texture_tables import (
     SEEN,
     SIDE,
     CompressedTextures,
     ViewTextures,
 )
-from pipelines.street_billboards.textures.plane_resolution import sample_places
 
 Planes = tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.uint8]]
 Scales = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
@@ -78,7 +78,7 @@ def decodable(textures: CompressedTextures) -> Decodable:
     )
 
 
-def decoded_views(
+def decode_views(
     textures: CompressedTextures | Decodable,
     billboards: NDArray[np.integer],
     position: NDArray[np.floating],

@@ -14,7 +14,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.textures.coded_arrays import CodedArrays
-from pipelines.street_billboards.textures.forms import SEEN, SIDE
 from pipelines.street_billboards.textures.low_rank_fit import (
     Factors,
     FloatArray,
@@ -29,6 +28,7 @@ from pipelines.street_billboards.textures.plane_resolution import (
     sharpen,
     upsampled,
 )
+from pipelines.street_billboards.textures.texture_tables import SEEN, SIDE
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]

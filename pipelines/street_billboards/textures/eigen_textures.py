@@ -1,10 +1,10 @@
 """Billboards' views compressed as eigen-textures (4.2, Eq. 1), and the paper's own form of them.
 
-`compressed` spends bytes where they take off most error: luma in full and chroma in half
+`compress_views` spends bytes where they take off most error: luma in full and chroma in half
 resolution, for each billboard and channel as many planes as pay. One exchange rate of squared error
 for bytes holds for all of them (a Lagrange multiplier), searched until the error asked for is met.
 
-`compressed_paper` is what section 4.2 says: R, G and B, 32 directions, r planes each.
+`compress_views_as_paper` is what section 4.2 says: R, G and B, 32 directions, r planes each.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from pipelines.street_billboards.textures.eigen_kernels import (
     code_billboards,
     rank_errors,
 )
-from pipelines.street_billboards.textures.forms import (
-    SEEN,
-    SIDE,
-    CompressedTextures,
-    ViewTextures,
-)
 from pipelines.street_billboards.textures.low_rank_fit import RIDGE
-from pipelines.street_billboards.textures.masks import masks_of
+from pipelines.street_billboards.textures.masks import opacity_masks
 from pipelines.street_billboards.textures.paper_form import (
     code_paper,
     masks_of_directions,
     nearest_views,
     paper_squares,
-    reaching,
+    ranks_for_contribution,
 )
-from pipelines.street_billboards.textures.rank_choice import chosen
+from pipelines.street_billboards.textures.rank_allocation import allocate_ranks
+from pipelines.street_billboards.textures.texture_tables import (
+    SEEN,
+    SIDE,
+    CompressedTextures,
+    ViewTextures,
+)
 from pipelines.street_billboards.textures.view_directions import DIRECTIONS
 
 _SIDES = (4, 8, 16, 32)
@@ -54,7 +54,7 @@ _AIM, _NEAR = 0.995, 0.99
 """Of the squared error asked for: what is aimed at, and what is near enough."""
 
 
-def compressed(
+def compress_views(
     views: ViewTextures,
     turns: NDArray[np.bool_],
     *,
@@ -66,7 +66,7 @@ def compressed(
 ) -> CompressedTextures:
     """The fewest bytes whose RMSE over all SEEN texels is about ``error`` codes, or less.
 
-    turns (b,): see `masks_of`. chroma_side: 8, 16 or 32, of Co and Cg, which are in full where
+    turns (b,): see `opacity_masks`. chroma_side: 8, 16 or 32, of Co and Cg, which are in full where
     colour is "rgb". most_ranks: planes a billboard and channel, at most; never more than views that
     saw anything, and there may be none, only mean colours. view_weights (v,): how much each view
     counts in fits. Where the error is out of reach, the most planes allowed.
@@ -83,11 +83,11 @@ def compressed(
     squares *= importance[:, None]
     plane_bytes = np.diff(data.first)[:, None] + sides**2 + _SCALE_BYTES
     costs = plane_bytes[:, :, None] * np.arange(squares.shape[2])
-    first_mask, masks = masks_of(views, turns)
+    first_mask, masks = opacity_masks(views, turns)
     allowed = error**2 * 3.0 * float((views.states == SEEN).sum())
     aim, least = _AIM * allowed, np.inf
     for _ in range(_PASSES):
-        choice = chosen(squares, costs, aim)
+        choice = allocate_ranks(squares, costs, aim)
         made = as_textures(
             _coded(data, choice.ranks),
             colour=colour,
@@ -119,7 +119,7 @@ def _sampled(
     return ViewsToFit(first, views.colours, views.states, weights, luma_chroma, sides)
 
 
-def compressed_paper(
+def compress_views_as_paper(
     views: ViewTextures,
     turns: NDArray[np.bool_],
     *,
@@ -150,7 +150,7 @@ def compressed_paper(
     else:
         squares = np.zeros((count, 3, DIRECTIONS))
         paper_squares(data[0], data[1], data[2], data[3], squares)
-        ranks = reaching(squares, contribution)
+        ranks = ranks_for_contribution(squares, contribution)
         if rank is not None:
             ranks = np.minimum(ranks, np.uint8(rank))
     sides = np.full(3, SIDE)
@@ -219,8 +219,18 @@ def _check(
 # ---- what the codes mean -----------------------------------------------------------------------
 
 
-def decoded(textures: CompressedTextures, billboard: int) -> NDArray[np.float32]:
-    """All views (n, 32, 32, 3) of a billboard by NumPy, in codes of 0 to 255, not rounded."""
+def decode_billboard(textures: CompressedTextures, billboard: int) -> NDArray[np.float32]:
+    """All views (n, 32, 32, 3) of a billboard by NumPy, in codes of 0 to 255, not rounded.
+
+    >>> none = np.zeros((3, 0, 32, 32), np.uint8)
+    >>> grey = CompressedTextures(
+    ...     "rgb", np.array([0, 2]), np.uint8([14, 15]), np.uint8([[90, 95, 90], [80, 85, 80]]),
+    ...     np.uint8([[0, 0, 0]]), tuple(none), (np.zeros(0, np.float32),) * 3,
+    ...     tuple(none[..., 0, 0]), np.array([0, 1]), np.full((1, 32, 4), 255, np.uint8),
+    ... )
+    >>> decode_billboard(grey, 0)[:, 7, 7].tolist()
+    [[90.0, 95.0, 90.0], [80.0, 85.0, 80.0]]
+    """
     begin, end = (int(row) for row in textures.first[billboard : billboard + 2])
     channels = []
     for c in range(3):
@@ -249,7 +259,7 @@ def _sampling(side: int) -> NDArray[np.float64]:
     return np.maximum(1.0 - np.abs(places[:, None] - np.arange(side)), 0.0)
 
 
-def alpha(textures: CompressedTextures, billboard: int) -> NDArray[np.bool_]:
+def unpack_masks(textures: CompressedTextures, billboard: int) -> NDArray[np.bool_]:
     """Opaque texels (1 or n, 32, 32) of a billboard that stands still, or turns."""
     rows = slice(*textures.first_mask[billboard : billboard + 2])
     return np.unpackbits(textures.masks[rows], axis=-1).astype(np.bool_)

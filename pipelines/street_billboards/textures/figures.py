@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.billboards import Billboards, turned_axes
-from pipelines.street_billboards.capture.point_fusion import FrameViews
+from pipelines.street_billboards.billboards import Billboards, axes_facing
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
 from pipelines.street_billboards.textures.atlases import Page
-from pipelines.street_billboards.textures.eigen_textures import alpha, decoded
-from pipelines.street_billboards.textures.forms import (
+from pipelines.street_billboards.textures.eigen_textures import decode_billboard, unpack_masks
+from pipelines.street_billboards.textures.texture_tables import (
     SEEN,
     SIDE,
     CompressedTextures,
@@ -28,7 +28,7 @@ _DECODED = 200
 def sampling_error(
     billboards: Billboards,
     views: ViewTextures,
-    photographs: FrameViews,
+    photographs: RgbdViews,
     codes: NDArray[np.uint8],
 ) -> float:
     """Median codes by which SEEN texels differ from the most alike photograph there.
@@ -51,7 +51,7 @@ def sampling_error(
         for k, pose in enumerate(photographs.poses):
             row, column = billboards.half_s[number], billboards.half_t[number]
             if billboards.turns[number]:
-                across, up = turned_axes(billboards.centre[number], pose[:3, 3])
+                across, up = axes_facing(billboards.centre[number], pose[:3, 3])
                 row, column = across * row[0], up * column[2]
             points = billboards.centre[number] + s[..., None] * row + t[..., None] * column
             pixels, depth = project_points(photographs.intrinsics[k], pose, points[seen])
@@ -69,7 +69,7 @@ def decoded_rmse(views: ViewTextures, textures: CompressedTextures) -> float:
     squares, count = 0.0, 0
     for number in _some(np.flatnonzero(np.diff(views.first) > 0)):
         rows = slice(views.first[number], views.first[number + 1])
-        found = decoded(textures, int(number))
+        found = decode_billboard(textures, int(number))
         stored = textures.direction[textures.first[number] : textures.first[number + 1]]
         found = found[np.searchsorted(stored, views.direction[rows])]
         seen = views.states[rows] == SEEN
@@ -89,8 +89,8 @@ def unpacked_error(pages: Sequence[Page], textures: CompressedTextures) -> float
         for place in _some(np.flatnonzero(np.diff(textures.first)[page.billboards] > 0)):
             number = int(page.billboards[place])
             found, masks = _read(page, int(place))
-            most = max(most, float(np.abs(found - decoded(textures, number)).max()))
-            if not np.array_equal(masks, alpha(textures, number)):
+            most = max(most, float(np.abs(found - decode_billboard(textures, number)).max()))
+            if not np.array_equal(masks, unpack_masks(textures, number)):
                 return 255.0
     return most
 

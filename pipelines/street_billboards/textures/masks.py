@@ -6,10 +6,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.forms import EMPTY, SEEN, SIDE, UNSEEN, ViewTextures
+from pipelines.street_billboards.textures.texture_tables import (
+    EMPTY,
+    SEEN,
+    SIDE,
+    UNSEEN,
+    ViewTextures,
+)
 
 
-def masks_of(
+def opacity_masks(
     views: ViewTextures, turns: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """``first_mask`` (b + 1,) and ``masks`` (m, 32, 4) of CompressedTextures.

@@ -18,7 +18,6 @@ from pipelines.street_billboards.textures.eigen_kernels import (
     colour_channels,
     texel_weights,
 )
-from pipelines.street_billboards.textures.forms import SIDE, ViewTextures
 from pipelines.street_billboards.textures.low_rank_fit import (
     RIDGE,
     Factors,
@@ -27,8 +26,9 @@ from pipelines.street_billboards.textures.low_rank_fit import (
     dot,
     truncated_svd,
 )
-from pipelines.street_billboards.textures.masks import masks_of
+from pipelines.street_billboards.textures.masks import opacity_masks
 from pipelines.street_billboards.textures.plane_resolution import fill_unknown
+from pipelines.street_billboards.textures.texture_tables import SIDE, ViewTextures
 from pipelines.street_billboards.textures.view_directions import DIRECTIONS
 
 Bytes = NDArray[np.uint8]
@@ -170,7 +170,7 @@ def nearest_views(views: ViewTextures) -> NDArray[np.int64]:
     return nearest
 
 
-def reaching(squares: NDArray[np.float64], contribution: float) -> NDArray[np.uint8]:
+def ranks_for_contribution(squares: NDArray[np.float64], contribution: float) -> NDArray[np.uint8]:
     """How many of squared singular values (b, 3, 32), falling, add up to a share of all."""
     total = squares.sum(axis=2, keepdims=True)
     # A hair less, so that the share 1 does not hang on rounding.
@@ -182,7 +182,7 @@ def masks_of_directions(
     views: ViewTextures, turns: NDArray[np.bool_], nearest: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
     """Masks of the observed views, for all 32 directions of what turns."""
-    first, masks = masks_of(views, turns)
+    first, masks = opacity_masks(views, turns)
     first_mask = offsets(np.where(turns, DIRECTIONS, 1))
     result = np.zeros((first_mask[-1], SIDE, SIDE // 8), np.uint8)
     result[first_mask[:-1][~turns]] = masks[first[:-1][~turns]]

@@ -34,7 +34,7 @@ class Photographs(NamedTuple):
     """(k, 3, 3)."""
     to_world: FloatArray
     """(k, 4, 4)."""
-    codes: NDArray[np.uint8]
+    exposure_lut: NDArray[np.uint8]
     """(k, 256, 3), code that evens out the exposure, by the photograph's code and channel."""
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.forms import SIDE
 from pipelines.street_billboards.textures.low_rank_fit import Factors
+from pipelines.street_billboards.textures.texture_tables import SIDE
 
 FloatArray = NDArray[np.float32]
 

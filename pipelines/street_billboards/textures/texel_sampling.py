@@ -15,8 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.billboards import OVERLAP, Billboards
-from pipelines.street_billboards.textures.forms import EMPTY, SEEN, SIDE, UNSEEN
 from pipelines.street_billboards.textures.photographs import Photographs
+from pipelines.street_billboards.textures.texture_tables import EMPTY, SEEN, SIDE, UNSEEN
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class _Photograph(NamedTuple):
     deviation: NDArray[np.float32]
     intrinsics: FloatArray
     to_world: FloatArray
-    codes: NDArray[np.uint8]
+    exposure_lut: NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True)
@@ -92,7 +92,7 @@ def sample_views(
                 photographs.deviation[k],
                 photographs.intrinsics[k],
                 photographs.to_world[k],
-                photographs.codes[k],
+                photographs.exposure_lut[k],
             )
             eye = photograph.to_world[:, 3]
             if billboards.turns[b]:
@@ -156,7 +156,7 @@ def _pixels_a_texel(billboard: _FacingCamera, photograph: _Photograph) -> float:
 def _turned(
     centre: FloatArray, eye: FloatArray, half: float, row: FloatArray, column: FloatArray
 ) -> None:
-    """``billboards.turned_axes`` times ``half``."""
+    """``billboards.axes_facing`` times ``half``."""
     nx, ny, nz = eye[0] - centre[0], eye[1] - centre[1], eye[2] - centre[2]
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     nx, ny, nz = nx / length, ny / length, nz / length
@@ -270,7 +270,7 @@ def _colour(
 ) -> None:
     """Mean of bilinear samples of a photograph inside a texel, evened out, in codes."""
     centre, row, column = billboard.centre, billboard.row, billboard.column
-    pixels, codes = photograph.pixels, photograph.codes
+    pixels, codes = photograph.pixels, photograph.exposure_lut
     height, width = pixels.shape[:2]
     found[:] = 0.0
     step = 2.0 / (SIDE * samples)

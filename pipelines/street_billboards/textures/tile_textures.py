@@ -10,8 +10,8 @@ from pipelines.geometry.cameras import Cameras
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.road_tiles import TiledBillboards, frames_that_see
 from pipelines.street_billboards.textures import view_textures as sampling
-from pipelines.street_billboards.textures.forms import ViewTextures, joined
-from pipelines.street_billboards.textures.view_textures import Photographs
+from pipelines.street_billboards.textures.photographs import Photographs
+from pipelines.street_billboards.textures.texture_tables import ViewTextures, join_views
 
 
 def view_textures_by_tile(
@@ -41,4 +41,4 @@ def view_textures_by_tile(
             )
         )
         del photographs  # before the next tile's are loaded
-    return joined(parts)
+    return join_views(parts)

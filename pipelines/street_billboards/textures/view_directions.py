@@ -24,6 +24,9 @@ def fan_position(
 
     offsets (…, 2 or 3): from the billboard's centre to the viewer; first: the fan's first
     direction, 0 to 59.
+
+    >>> fan_position(np.array([[0.0, -5.0, 1.0], [2.0, -2.0, 1.0]]), first=30)
+    array([15. , 22.5])
     """
     azimuth = np.degrees(np.arctan2(offsets[..., 1], offsets[..., 0])) / SPACING
     outside = (CIRCLE - DIRECTIONS + 1) / 2

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.billboards import Billboards
-from pipelines.street_billboards.textures.forms import SEEN, SIDE, ViewTextures
 from pipelines.street_billboards.textures.photographs import Photographs, best_photographs
 from pipelines.street_billboards.textures.texel_sampling import SampledViews, sample_views
+from pipelines.street_billboards.textures.texture_tables import SEEN, SIDE, ViewTextures
 
 TRIED = 4
 """Photographs that are asked for one view."""

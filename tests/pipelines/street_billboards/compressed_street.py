@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.street_billboards.billboards import Billboards
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 from pipelines.street_billboards.textures.view_directions import CIRCLE
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.street_billboards.billboards import OVERLAP, Billboards
-from pipelines.street_billboards.textures.view_textures import Photographs
+from pipelines.street_billboards.textures.photographs import Photographs
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 FloatArray = NDArray[np.float64]

@@ -12,9 +12,9 @@ from pipelines.geometry.cameras import Cameras
 from pipelines.street_billboards.billboards import (
     OVERLAP,
     Billboards,
-    laid_through,
+    axes_facing,
+    fit_billboards,
     plane_axes,
-    turned_axes,
 )
 from pipelines.street_billboards.octree import octree_leaves
 from pipelines.street_billboards.textures.view_directions import CIRCLE, DIRECTIONS, fan_position
@@ -81,7 +81,7 @@ def test_rectangles_lie_in_the_plane_and_cover_it(
     viewers = cameras_at(
         np.array([3.0 * normal + [0.01, 0.2, 0.1], 4.0 * normal + [-0.3, 0.1, 0.2]])
     )
-    made = laid_through(leaves, points, viewers)
+    made = fit_billboards(leaves, points, viewers)
     # Only where the plane cuts little of a voxel may its points look like a line.
     assert made.turns.mean() < 0.2
     half = SIDE * (0.5 + OVERLAP)
@@ -102,7 +102,7 @@ def test_normals_face_the_cameras(behind: bool) -> None:
     points = on_plane(np.array([0.2, 1.0, 0.1]), 4000, 0, noise=0.01)
     y = 5.0 if behind else -5.0
     viewers = cameras_at(np.array([[-2.0, y, 0.3], [0.0, y, 0.3], [2.0, y, 0.3]]))
-    made = laid_through(octree_leaves(points, SIDE, 10), points, viewers)
+    made = fit_billboards(octree_leaves(points, SIDE, 10), points, viewers)
     still = ~made.turns
     normal = np.cross(made.half_s, made.half_t)[still]
     for place in viewers.to_world[:, :3, 3]:
@@ -119,7 +119,7 @@ def test_poles_wires_and_bushes_turn() -> None:
     bush = rng.uniform([0, 12, 0], [2, 14, 2], (6000, 3))
     points = np.concatenate([pole, wire, bush])
     viewers = cameras_at(np.array([[-4.0, 1.0, 1.0], [-4.0, 4.0, 1.0]]))
-    made = laid_through(octree_leaves(points, SIDE, 5), points, viewers)
+    made = fit_billboards(octree_leaves(points, SIDE, 5), points, viewers)
     assert made.turns.all()
     np.testing.assert_array_equal(made.centre, made.voxel)
     # A sphere around the enlarged voxel fits into the square, whichever way it is turned.
@@ -130,7 +130,7 @@ def test_poles_wires_and_bushes_turn() -> None:
 def test_all_of_them_turn_in_the_paper() -> None:
     points = on_plane(np.array([0.0, 1.0, 0.0]), 2000, 0)
     leaves = octree_leaves(points, SIDE, 5)
-    made = laid_through(leaves, points, cameras_at(np.array([[0.0, -5, 1]])), all_turn=True)
+    made = fit_billboards(leaves, points, cameras_at(np.array([[0.0, -5, 1]])), all_turn=True)
     assert made.turns.all()
     np.testing.assert_array_equal(made.centre, leaves.middle)
 
@@ -154,7 +154,7 @@ def test_a_wall_along_a_border_of_voxels_has_no_hole(
 
     points = wall(16_000, noise, 1.5)
     viewers = cameras_at(np.array([[-1.0, -5.0, 0.2], [1.0, -5.0, 0.2]]))
-    made = laid_through(octree_leaves(points, SIDE, 12), points, viewers)
+    made = fit_billboards(octree_leaves(points, SIDE, 12), points, viewers)
     assert shown(made, wall(2000, 0.0, 1.2), 0.12 * SIDE).all()
 
 
@@ -165,7 +165,7 @@ def test_one_plane_is_not_shown_twice() -> None:
     points = np.column_stack([x, 0.1 * SIDE + rng.normal(0, 0.05 * SIDE, len(x)), z])
     leaves = octree_leaves(points, SIDE, 12)
     assert (leaves.middle[:, 1] < 0).any()
-    made = laid_through(leaves, points, cameras_at(np.array([[0.0, -5.0, 0.1]])))
+    made = fit_billboards(leaves, points, cameras_at(np.array([[0.0, -5.0, 0.1]])))
     assert (made.voxel[:, 1] > 0).all()
     assert shown(made, np.column_stack([x, np.full(len(x), 0.1 * SIDE), z]), 0.03).all()
 
@@ -174,13 +174,13 @@ def test_one_plane_is_not_shown_twice() -> None:
 
 
 @given(centre=st.tuples(*[st.floats(-9, 9)] * 3), way=directions, away=st.floats(0.2, 50))
-def test_turned_axes_face_the_eye(
+def test_axes_face_the_eye(
     centre: tuple[float, float, float], way: tuple[float, float, float], away: float
 ) -> None:
     if np.hypot(way[0], way[1]) < 1e-3:
         return  # straight above it nothing is level and to the right
     unit = np.array(way) / np.linalg.norm(way)
-    row, column = turned_axes(np.array(centre), np.array(centre) + away * unit)
+    row, column = axes_facing(np.array(centre), np.array(centre) + away * unit)
     axes = np.stack([row, column, unit])
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-9)
     np.testing.assert_allclose(np.cross(row, column), unit, atol=1e-9)
@@ -188,12 +188,12 @@ def test_turned_axes_face_the_eye(
     assert column[2] > 0
 
 
-def test_turned_axes_take_many() -> None:
+def test_axes_of_many() -> None:
     rng = np.random.default_rng(0)
     centres, eye = rng.normal(size=(5, 3)), np.array([3.0, 4.0, 1.0])
-    row, column = turned_axes(centres, eye)
+    row, column = axes_facing(centres, eye)
     for number, centre in enumerate(centres):
-        one = turned_axes(centre, eye)
+        one = axes_facing(centre, eye)
         np.testing.assert_allclose(row[number], one[0])
         np.testing.assert_allclose(column[number], one[1])
 
@@ -237,7 +237,7 @@ def test_fans_hold_cameras_of_a_right_angle_however_near(
     points = np.random.default_rng(0).uniform(-0.2, 0.2, (40, 3)) * [1, 0.01, 1]
     leaves = octree_leaves(points + 0.21, SIDE, 5)
     aim = leaves.middle[0]
-    made = laid_through(leaves, points + 0.21, cameras_at(spots + aim, aim), all_turn=turning)
+    made = fit_billboards(leaves, points + 0.21, cameras_at(spots + aim, aim), all_turn=turning)
     assert made.fan.min() >= 0
     assert made.fan.max() < CIRCLE
     assert fans_hold(made, spots + aim)
@@ -251,7 +251,7 @@ def test_fans_hold_half_a_circle_of_cameras_at_one_distance(middle: float, span:
     points = np.full((10, 3), 0.1)
     leaves = octree_leaves(points, SIDE, 5)
     aim = leaves.middle[0]
-    made = laid_through(leaves, points, cameras_at(spots + aim, aim), all_turn=True)
+    made = fit_billboards(leaves, points, cameras_at(spots + aim, aim), all_turn=True)
     assert fans_hold(made, spots + aim)
 
 
@@ -263,6 +263,6 @@ def test_fans_count_only_cameras_that_have_it_in_their_picture() -> None:
     there = cameras_at(spots)
     there.to_world[1:, :3, 0] *= -1
     there.to_world[1:, :3, 2] *= -1
-    made = laid_through(leaves, points, there, all_turn=True)
+    made = fit_billboards(leaves, points, there, all_turn=True)
     place = fan_position(spots[0] - made.voxel, made.fan)
     np.testing.assert_allclose(place, (DIRECTIONS - 1) / 2, atol=0.51)

@@ -14,7 +14,7 @@ from pipelines.street_billboards.octree import (
     MOST_DEPTH,
     Leaves,
     morton_codes,
-    neighbours,
+    neighbouring_leaves,
     octree_leaves,
 )
 
@@ -129,7 +129,7 @@ def test_neighbours_by_brute_force(seed: int, most: int, at_the_end: bool) -> No
         cell = np.unique(cell, axis=0)
     cell = cell[np.argsort(morton_codes(cell))]
     rows = {tuple(one): row for row, one in enumerate(cell.tolist())}
-    found = neighbours(cell)
+    found = neighbouring_leaves(cell)
     number = 0
     for dx in (-1, 0, 1):
         for dy in (-1, 0, 1):

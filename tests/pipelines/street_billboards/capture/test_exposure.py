@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
 from pipelines.geometry.cameras import unproject_depth
-from pipelines.street_billboards.capture.exposure import evening_codes, exposure_gains
-from pipelines.street_billboards.capture.point_fusion import FrameViews
-from pipelines.street_billboards.textures.observations import Observations, observed
+from pipelines.street_billboards.capture.exposure import exposure_gains, exposure_lut
+from pipelines.street_billboards.capture.observations import Observations, observe_points
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 
@@ -84,7 +84,7 @@ def test_nothing_observed_changes_nothing() -> None:
 
 def test_codes_of_gains() -> None:
     gains = np.array([[1.0, 2.0, 0.5], [0.8, 1.0, 1.7]])
-    codes = evening_codes(gains)
+    codes = exposure_lut(gains)
     assert codes.shape == (2, 256, 3)
     np.testing.assert_array_equal(codes[0, :, 0], np.arange(256))
     np.testing.assert_array_equal(codes[1, :, 1], np.arange(256))
@@ -101,7 +101,7 @@ def test_codes_even_out_what_gains_did() -> None:
     light = np.linspace(0.01, 0.45, 50)[:, None].repeat(3, axis=1)
     gains = np.array([0.6, 1.3, 2.1])
     photographed = np.rint(encode_srgb(light * gains) * 255).astype(int)
-    evened = evening_codes(gains)[photographed, np.arange(3)]
+    evened = exposure_lut(gains)[photographed, np.arange(3)]
     assert np.abs(evened - encode_srgb(light) * 255).max() < 1.5
 
 
@@ -122,11 +122,11 @@ def test_observed_by_brute_force() -> None:
     depth[rng.random(depth.shape) < 0.2] = np.nan
     deviation = rng.uniform(0.05, 0.5, depth.shape).astype(np.float32)
     pictures = rng.integers(0, 256, (3, height, width, 3), dtype=np.uint8)
-    views = FrameViews(depth, deviation, pictures, np.stack(lenses), np.stack(poses))
+    views = RgbdViews(depth, deviation, pictures, np.stack(lenses), np.stack(poses))
     # Half of them near what the depth maps say, half anywhere, behind cameras too.
     near = unproject_depth(lenses[1], poses[1], np.nan_to_num(depth[1], nan=5.0)).reshape(-1, 3)
     points = np.concatenate([near + rng.normal(0, 0.3, near.shape), rng.uniform(-12, 12, (300, 3))])
-    found = observed(points, views, farthest=farthest)
+    found = observe_points(points, views, farthest=farthest)
 
     expected = {}
     for k in range(3):
@@ -160,7 +160,7 @@ def test_shifted_observations_belong_to_later_photographs() -> None:
 def test_few_points_are_fine(count: int) -> None:
     lens, pose = placed_camera((0, -5.0, 0), (0, 0, 0), (8, 8), 6.0)
     flat = np.full((1, 8, 8), 5.0, np.float32)
-    views = FrameViews(
+    views = RgbdViews(
         flat, 0 * flat + 0.1, np.full((1, 8, 8, 3), 90, np.uint8), lens[None], pose[None]
     )
-    assert len(observed(np.zeros((count, 3)), views, farthest=9.0).point) == count
+    assert len(observe_points(np.zeros((count, 3)), views, farthest=9.0).point) == count

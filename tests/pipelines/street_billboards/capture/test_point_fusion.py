@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.capture.point_fusion import (
-    FrameViews,
     Points,
-    agreement,
+    RgbdViews,
     consistent_points,
-    fused,
+    fuse_points,
+    photometric_agreement,
 )
 from pipelines.street_billboards.capture.stereo import depth_maps
 from tests.pipelines.street_billboards.stereo_street import (
@@ -29,40 +29,40 @@ PLACES = (0.0, 3.0, 6.0)
 def _views(
     intrinsics: Callable[[Array], Array] = lambda k: k,
     poses: Callable[[Array, int], Array] = lambda pose, number: pose,
-) -> list[FrameViews]:
+) -> list[RgbdViews]:
     """Three frames as seen with other intrinsics and poses than the true ones."""
     views = []
     for number, place in enumerate(PLACES):
         frame = frame_at(place)
         lens, pose = intrinsics(frame.intrinsics), poses(frame.poses, number)
         maps = depth_maps(frame.photographs, lens, pose)
-        views.append(FrameViews(maps.depth, maps.deviation, frame.photographs, lens, pose))
+        views.append(RgbdViews(maps.depth, maps.deviation, frame.photographs, lens, pose))
     return views
 
 
-def _together(*views: FrameViews) -> FrameViews:
-    return FrameViews(*(np.concatenate(columns) for columns in zip(*views, strict=True)))
+def _together(*views: RgbdViews) -> RgbdViews:
+    return RgbdViews(*(np.concatenate(columns) for columns in zip(*views, strict=True)))
 
 
-def _first(views: FrameViews) -> FrameViews:
-    return FrameViews._make(column[:1] for column in views)
+def _first(views: RgbdViews) -> RgbdViews:
+    return RgbdViews._make(column[:1] for column in views)
 
 
-def _agreement(views: list[FrameViews]) -> float:
-    return agreement(views[1], _together(views[0], views[2]))
+def _agreement(views: list[RgbdViews]) -> float:
+    return photometric_agreement(views[1], _together(views[0], views[2]))
 
 
 @pytest.fixture(scope="module")
-def views() -> list[FrameViews]:
+def views() -> list[RgbdViews]:
     return _views()
 
 
 @pytest.fixture(scope="module")
-def points(views: list[FrameViews]) -> Points:
+def points(views: list[RgbdViews]) -> Points:
     return consistent_points(views[1], _together(views[0], views[2]))
 
 
-def test_points_lie_on_the_street(views: list[FrameViews], points: Points) -> None:
+def test_points_lie_on_the_street(views: list[RgbdViews], points: Points) -> None:
     ahead = points.positions[:, 1] - PLACES[1]
     away = distances_to_street(points.positions)
     assert len(away) > 50_000
@@ -73,7 +73,7 @@ def test_points_lie_on_the_street(views: list[FrameViews], points: Points) -> No
     assert len(away) < taken.sum()
 
 
-def test_asking_more_neighbours_to_agree_leaves_fewer_and_better(views: list[FrameViews]) -> None:
+def test_asking_more_neighbours_to_agree_leaves_fewer_and_better(views: list[RgbdViews]) -> None:
     beside = _together(views[0], views[2])
     loose, strict = (
         consistent_points(views[1], beside, least_support=n, farthest=12.0) for n in (1, 4)
@@ -83,7 +83,7 @@ def test_asking_more_neighbours_to_agree_leaves_fewer_and_better(views: list[Fra
     assert shares[1] > shares[0]
 
 
-def test_points_have_their_pixels_colours_and_step_thins_them(views: list[FrameViews]) -> None:
+def test_points_have_their_pixels_colours_and_step_thins_them(views: list[RgbdViews]) -> None:
     beside = _together(views[0], views[2])
     few = consistent_points(views[1], beside, step=8, farthest=9.0)
     many = consistent_points(views[1], beside, step=4, farthest=9.0)
@@ -105,15 +105,15 @@ def test_normals_look_at_the_cameras(points: Points) -> None:
     assert (points.normals[wall, 0] > 0.9).mean() > 0.6
 
 
-def test_the_frames_own_views_confirm_nothing(views: list[FrameViews]) -> None:
+def test_the_frames_own_views_confirm_nothing(views: list[RgbdViews]) -> None:
     assert len(consistent_points(views[1], views[1]).weight) == 0
-    assert agreement(views[1], views[1]) == 0.0
+    assert photometric_agreement(views[1], views[1]) == 0.0
     with_own = consistent_points(views[1], _together(*views), step=4)
     without = consistent_points(views[1], _together(views[0], views[2]), step=4)
     np.testing.assert_array_equal(with_own.positions, without.positions)
 
 
-def test_what_others_look_through_goes(views: list[FrameViews]) -> None:
+def test_what_others_look_through_goes(views: list[RgbdViews]) -> None:
     """A board in the air before one frame's cameras, which no other frame saw."""
     board = views[1].depth.copy()
     board[:, 60:100, 100:200] = 4.0
@@ -129,7 +129,7 @@ def test_sky_seen_behind_a_point_speaks_against_it() -> None:
     lens = np.array([[50.0, 0, 29.5], [0, 50, 19.5], [0, 0, 1]])
     poses = np.tile(np.eye(4), (6, 1, 1))
     poses[:, 0, 3] = np.arange(6) * 0.5
-    flat = FrameViews(
+    flat = RgbdViews(
         np.repeat(depth[:1], 6, axis=0),
         np.full((6, 40, 60), 0.05, np.float32),
         np.zeros((6, 40, 60, 3), np.uint8),
@@ -148,7 +148,7 @@ def test_points_move_to_the_mean_of_what_is_measured() -> None:
     poses[:, 0, 3] = [0, 0.1, -0.1]
     depth = np.broadcast_to(np.array([10.0, 10.1, 10.2], np.float32)[:, None, None], (3, 40, 60))
     deviation = np.broadcast_to(np.array([0.2, 0.1, 0.1], np.float32)[:, None, None], (3, 40, 60))
-    views = FrameViews(
+    views = RgbdViews(
         depth, deviation, np.zeros((3, 40, 60, 3), np.uint8), np.tile(lens, (3, 1, 1)), poses
     )
     found = consistent_points(_first(views), views)
@@ -193,7 +193,7 @@ def _drifting(*degrees: float) -> Callable[[Array, int], Array]:
     return changed
 
 
-def test_right_calibrations_agree(views: list[FrameViews]) -> None:
+def test_right_calibrations_agree(views: list[RgbdViews]) -> None:
     assert _agreement(views) > 0.5
 
 
@@ -226,8 +226,8 @@ def _plane(n: int, seed: int, *, y: float = 0.0) -> Points:
 
 
 def test_the_union_has_one_point_a_cell_whatever_the_number_of_parts() -> None:
-    once = fused([_plane(40_000, 0)], cell=0.1)
-    often = fused((_plane(40_000, seed) for seed in range(8)), cell=0.1)
+    once = fuse_points([_plane(40_000, 0)], cell=0.1)
+    often = fuse_points((_plane(40_000, seed) for seed in range(8)), cell=0.1)
     assert len(once.weight) == len(often.weight) == 1596  # corners have too little company
     cells = np.floor(often.positions / 0.1).astype(int)
     assert len(np.unique(cells, axis=0)) == 1596
@@ -238,16 +238,16 @@ def test_the_union_has_one_point_a_cell_whatever_the_number_of_parts() -> None:
 
 def test_merging_early_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = [_plane(5_000, seed) for seed in range(6)]
-    late = fused(parts)
+    late = fuse_points(parts)
     monkeypatch.setattr("pipelines.street_billboards.capture.point_fusion._PENDING", 1000)
-    early = fused(parts)
+    early = fuse_points(parts)
     np.testing.assert_allclose(early.positions, late.positions, atol=1e-12)
     np.testing.assert_array_equal(early.colours, late.colours)
 
 
 def test_heavier_points_count_for_more() -> None:
     one, other = _plane(20_000, 0), _plane(20_000, 50)
-    both = fused([one, other._replace(weight=np.full(20_000, 99, np.float32))], cell=0.5)
+    both = fuse_points([one, other._replace(weight=np.full(20_000, 99, np.float32))], cell=0.5)
     assert (np.abs(both.colours.astype(float) - 149.5) <= 1).all()
 
 
@@ -256,7 +256,7 @@ def test_points_that_stand_alone_go_and_edges_of_tiles_stay() -> None:
     stray = _plane(5, 1)._replace(
         positions=np.array([[0, 0, 2], [1, 0, 3], [5, 5, 5], [1, 1, 1.5], [-1, 1, 2.0]], float)
     )
-    found = fused([road, stray], cell=0.1)
+    found = fuse_points([road, stray], cell=0.1)
     assert len(found.weight) == 1596
     assert found.positions[:, 2].max() < 0.01
 
@@ -267,11 +267,11 @@ def test_nothing_makes_nothing() -> None:
         np.zeros(0, np.float32),
     )  # fmt: skip
     for parts in ([], [nothing]):
-        assert len(fused(parts).positions) == 0
+        assert len(fuse_points(parts).positions) == 0
 
 
-def test_the_union_of_a_drive_lies_on_the_street(views: list[FrameViews]) -> None:
+def test_the_union_of_a_drive_lies_on_the_street(views: list[RgbdViews]) -> None:
     parts = [consistent_points(frame, _together(*views), farthest=12.0) for frame in views]
-    found = fused(parts)
+    found = fuse_points(parts)
     assert len(found.weight) < sum(len(part.weight) for part in parts)
     assert (distances_to_street(found.positions) < 0.05).mean() > 0.88

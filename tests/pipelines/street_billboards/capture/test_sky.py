@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, to_8bit
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.capture.sky import SkyView, rays_of, sky_along, sky_map, sky_pixels
+from pipelines.street_billboards.capture.sky import (
+    SkyView,
+    pixel_rays,
+    sky_along,
+    sky_map,
+    sky_pixels,
+)
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 WIDTH, HEIGHT = 160, 120
@@ -29,7 +35,7 @@ def photograph(azimuth: float, *, rim: int = 4, seed: int = 0) -> tuple[SkyView,
     angle = np.radians(azimuth)
     target = (np.cos(angle), np.sin(angle), 0.4)
     lens, pose = placed_camera((0.0, 0.0, 0.0), target, (WIDTH, HEIGHT), 90.0)
-    pixels = to_8bit(radiance(rays_of(lens, pose, WIDTH, HEIGHT)))
+    pixels = to_8bit(radiance(pixel_rays(lens, pose, WIDTH, HEIGHT)))
     sky = np.ones((HEIGHT, WIDTH), bool)
     sky[85:] = False
     for left in (10, 90):
@@ -133,7 +139,7 @@ def test_without_sky_there_is_none() -> None:
 
 def test_rays_are_unit_vectors_through_the_pixels() -> None:
     lens, pose = placed_camera((3.0, 1.0, 2.0), (0.0, 4.0, 5.0), (20, 14), 15.0)
-    rays = rays_of(lens, pose, 20, 14)
+    rays = pixel_rays(lens, pose, 20, 14)
     np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0)
     pixels, depth = project_points(lens, pose, pose[:3, 3] + 7.0 * rays)
     assert (depth > 0).all()

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pipelines.street_billboards.capture.stereo import (
     DepthMaps,
     depth_maps,
-    disparity_defaults,
-    match,
+    match_rectified_pair,
+    opencv_disparities,
 )
 from pipelines.street_billboards.capture.weighted_median import fill_disparity_holes
 from pipelines.street_billboards.figures import bad_pixel_share
@@ -39,8 +39,8 @@ def _relative_error(maps: DepthMaps, frame: Frame) -> NDArray[np.float32]:
 
 def test_a_real_pair_is_matched_better_than_by_opencv_as_it_comes(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
-    found, _ = match(left, right, 64)
-    defaults = bad_pixel_share(disparity_defaults(left, right, 64), truth)
+    found, _ = match_rectified_pair(left, right, 64)
+    defaults = bad_pixel_share(opencv_disparities(left, right, 64), truth)
     assert bad_pixel_share(found.disparity, truth) < 0.65 * defaults
     assert bad_pixel_share(fill_disparity_holes(found.disparity, left), truth) < 0.45 * defaults
     known = np.isfinite(found.disparity)
@@ -51,7 +51,9 @@ def test_a_real_pair_is_matched_better_than_by_opencv_as_it_comes(motorcycle: Pa
 
 def test_half_the_width_is_coarser_and_not_bad(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
-    fine, coarse = (match(left, right, 64, fine=way)[0].disparity for way in (True, False))
+    fine, coarse = (
+        match_rectified_pair(left, right, 64, fine=way)[0].disparity for way in (True, False)
+    )
     assert (
         bad_pixel_share(fill_disparity_holes(fine, left), truth)
         < bad_pixel_share(fill_disparity_holes(coarse, left), truth)
@@ -61,7 +63,7 @@ def test_half_the_width_is_coarser_and_not_bad(motorcycle: Pair) -> None:
 
 def test_the_right_photograph_has_disparities_of_its_own(motorcycle: Pair) -> None:
     left, right, _ = motorcycle
-    ours, theirs = match(left, right, 64)
+    ours, theirs = match_rectified_pair(left, right, 64)
     rows, columns = np.nonzero(np.isfinite(ours.disparity))
     there = np.rint(columns - ours.disparity[rows, columns]).astype(int)
     apart = ours.disparity[rows, columns] - theirs.disparity[rows, np.maximum(there, 0)]
@@ -71,7 +73,7 @@ def test_the_right_photograph_has_disparities_of_its_own(motorcycle: Pair) -> No
 def test_photographs_of_one_pair_may_be_exposed_differently(motorcycle: Pair) -> None:
     left, right, truth = motorcycle
     darker = np.rint(right * 0.87).astype(np.uint8)
-    same, other = (match(left, one, 64)[0].disparity for one in (right, darker))
+    same, other = (match_rectified_pair(left, one, 64)[0].disparity for one in (right, darker))
     assert bad_pixel_share(other, truth) < bad_pixel_share(same, truth) + 0.01
 
 
@@ -84,7 +86,7 @@ def test_a_shift_by_a_fraction_of_a_pixel_is_found() -> None:
     moved = cv2.warpAffine(grey, shifts, (size, size), flags=cv2.INTER_CUBIC)
     pair = [np.repeat(np.clip(np.rint(i), 0, 255).astype(np.uint8)[..., None], 3, 2)
             for i in (grey, moved)]  # fmt: skip
-    found, _ = match(pair[0], pair[1], 16)
+    found, _ = match_rectified_pair(pair[0], pair[1], 16)
     inside = found.disparity[20:-20, 30:-20]
     assert np.isfinite(inside).mean() > 0.98
     assert abs(np.nanmedian(inside) - 7.25) < 0.03
@@ -94,7 +96,7 @@ def test_a_shift_by_a_fraction_of_a_pixel_is_found() -> None:
 def test_nothing_to_match_has_no_disparity_or_is_flat() -> None:
     left = np.random.default_rng(1).integers(0, 255, (60, 90, 3)).astype(np.uint8)
     right = np.random.default_rng(2).integers(0, 255, (60, 90, 3)).astype(np.uint8)
-    found, _ = match(left, right, 32)
+    found, _ = match_rectified_pair(left, right, 32)
     assert np.isfinite(found.disparity).mean() < 0.3
 
 
@@ -193,4 +195,4 @@ def test_depths_are_where_they_are_asked_for(straight: tuple[Frame, DepthMaps]) 
 def test_photographs_of_different_sizes_are_refused() -> None:
     one, other = np.zeros((20, 30, 3), np.uint8), np.zeros((20, 31, 3), np.uint8)
     with pytest.raises(ValueError, match="expected \\(h, w, 3\\) both"):
-        match(one, other, 16)
+        match_rectified_pair(one, other, 16)

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.stage import Stage
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.billboards import Billboards, turned_axes
+from pipelines.street_billboards.billboards import Billboards, axes_facing
 from pipelines.street_billboards.drawing import quads
-from pipelines.street_billboards.drawing.culling import NEAR, visible
+from pipelines.street_billboards.drawing.culling import NEAR, visible_billboards
 from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
 from pipelines.street_billboards.drawing.shader_street import ShaderStreet
 from pipelines.street_billboards.drawing.stage_camera import stage_camera
-from pipelines.street_billboards.textures.atlases import pages
-from pipelines.street_billboards.textures.decoding import decoded_views
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.atlases import pack_pages
+from pipelines.street_billboards.textures.decoding import decode_views
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 from tests.pipelines.street_billboards.compressed_street import (
     facing,
     placed_camera,
@@ -43,7 +43,7 @@ def picture(street: Any, intrinsics: Any, pose: Any, size: tuple[int, int] = SIZ
 
 def decoded(textures: CompressedTextures, billboard: int, position: float) -> NDArray[np.uint8]:
     rgba = np.empty((1, SIDE, SIDE, 4), np.uint8)
-    decoded_views(textures, np.array([billboard]), np.array([position]), rgba)
+    decode_views(textures, np.array([billboard]), np.array([position]), rgba)
     return rgba[0]
 
 
@@ -143,7 +143,7 @@ def test_a_turning_square_faces_the_eye(street: Any, place: tuple[float, ...]) -
     # The camera looks beside it: what faces is the square, not its picture.
     intrinsics, pose = placed_camera(eye, (0.2, 0.1, 0.15), SIZE, 120.0)
     _, covered = picture(street(square, textures), intrinsics, pose)
-    row, column = turned_axes(square.centre[0], eye)
+    row, column = axes_facing(square.centre[0], eye)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.4 @ np.stack([row, column])
     pixels, _ = project_points(intrinsics, pose, corners)
     expected = inside(pixels, SIZE)
@@ -206,10 +206,10 @@ def test_packed_pages_are_drawn_like_textures() -> None:
     placed, textures = a_street(60, 10)
     camera = placed_camera((-9.0, -2.0, 0.3), (9, 2, 0), SIZE, 90.0)
     frame, _ = picture(ShaderStreet(placed, textures), *camera)
-    again, _ = picture(ShaderStreet(placed, pages(textures)), *camera)
+    again, _ = picture(ShaderStreet(placed, pack_pages(textures)), *camera)
     assert np.array_equal(frame, again)
     with pytest.raises(ValueError, match="found textures of 60 billboards; expected 61"):
-        ShaderStreet(scattered(61), pages(textures))
+        ShaderStreet(scattered(61), pack_pages(textures))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -231,7 +231,7 @@ def test_what_is_left_out_does_not_show(seed: int, monkeypatch: pytest.MonkeyPat
     def everything(placed: Billboards, *_: Any) -> NDArray[np.int64]:
         return np.argsort(np.linalg.norm(placed.centre - eye, axis=1))
 
-    monkeypatch.setattr(quads, "visible", everything)
+    monkeypatch.setattr(quads, "visible_billboards", everything)
     whole, whole_cover = picture(ShaderStreet(placed, textures), *camera)
     assert np.array_equal(cover, whole_cover)
     # The stage's near and far planes are others, and so are depths and rounding.
@@ -242,10 +242,10 @@ def test_culling_against_points_of_the_rectangles() -> None:
     placed = scattered(3000, seed=30, reach=6.0)
     eye = np.array([0.3, 0.2, -0.1])
     intrinsics, pose = placed_camera(eye, (3, 1, 0.5), SIZE, 100.0)
-    found = visible(placed, intrinsics, pose, *SIZE)
+    found = visible_billboards(placed, intrinsics, pose, *SIZE)
     distances = np.linalg.norm(placed.centre[found] - eye, axis=1)
     assert (np.diff(distances) >= 0).all()
-    row, column = turned_axes(placed.centre, eye)
+    row, column = axes_facing(placed.centre, eye)
     turns = placed.turns[:, None]
     half_s = np.where(turns, row * placed.half_s[:, :1], placed.half_s)
     half_t = np.where(turns, column * placed.half_t[:, 2:], placed.half_t)

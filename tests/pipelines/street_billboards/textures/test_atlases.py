@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.textures.atlases import Atlas, Page, arranged, pages
-from pipelines.street_billboards.textures.decoding import decoded_views
-from pipelines.street_billboards.textures.forms import SIDE
+from pipelines.street_billboards.textures.atlases import Atlas, Page, pack_pages, pack_slots
+from pipelines.street_billboards.textures.decoding import decode_views
+from pipelines.street_billboards.textures.texture_tables import SIDE
 from tests.pipelines.street_billboards.compressed_street import random_textures
 
 MIXED = np.arange(14) % 3 == 0
@@ -65,7 +65,7 @@ def test_a_page_read_as_described_is_what_was_packed(
     colour: str, tint_side: int, most: int
 ) -> None:
     textures = random_textures(MIXED, seed=1, colour=colour, tint_side=tint_side, most_views=4)
-    made = pages(textures, most)
+    made = pack_pages(textures, most)
     assert (len(made) > 1) == (most == 96)
     assert np.array_equal(np.concatenate([page.billboards for page in made]), np.arange(14))
     for page in made:
@@ -75,7 +75,7 @@ def test_a_page_read_as_described_is_what_was_packed(
                 found, direction = read_page(page, row, view)
                 assert direction == textures.direction[begin + view]
                 expected = np.empty((1, SIDE, SIDE, 4), np.uint8)
-                decoded_views(
+                decode_views(
                     textures, np.array([billboard]), np.array([float(direction)]), expected
                 )
                 off = np.abs(found.astype(int) - expected[0])
@@ -90,7 +90,7 @@ def test_a_page_read_as_described_is_what_was_packed(
 
 def test_weights_of_planes_of_others_are_nothing() -> None:
     textures = random_textures(np.zeros(9, bool), seed=2, ranks=(1, 1, 1), most_views=1)
-    page = pages(textures)[0]
+    page = pack_pages(textures)[0]
     first = page.records[:, 0, 0].astype(int)
     for row, texel in enumerate(first):
         weights = page.views.reshape(-1, 4)[texel + 1]
@@ -102,7 +102,7 @@ def test_weights_of_planes_of_others_are_nothing() -> None:
 @settings(max_examples=60, deadline=None)
 def test_slots_are_dense_and_few_reach_too_far(ranks: list[int]) -> None:
     of_billboard = np.array(ranks, np.int64)
-    first = arranged(of_billboard)
+    first = pack_slots(of_billboard)
     slots = [np.arange(start, start + r) for start, r in zip(first, ranks, strict=True)]
     every = np.sort(np.concatenate([np.empty(0, np.int64), *slots]))
     assert np.array_equal(every, np.arange(of_billboard.sum()))
@@ -119,13 +119,13 @@ def test_a_page_holds_the_papers_billboards() -> None:
         np.zeros(40, bool), colour="rgb", tint_side=32, ranks=16, most_views=2
     )
     of_paper = (512 // SIDE) ** 2 // 16
-    assert len(pages(textures, 512)[0].billboards) == 2 * of_paper
+    assert len(pack_pages(textures, 512)[0].billboards) == 2 * of_paper
 
 
 def test_bytes_are_known_beforehand() -> None:
     textures = random_textures(MIXED, seed=3)
     for most in (8192, 96):
-        made = pages(textures, most)
+        made = pack_pages(textures, most)
         held = sum(
             array.nbytes
             for page in made
@@ -137,37 +137,37 @@ def test_bytes_are_known_beforehand() -> None:
     stored = sum(planes.nbytes + 4 * len(planes) for planes in textures.planes)
     stored += sum(weights.nbytes for weights in textures.weights) + textures.masks.nbytes
     stored += 4 * len(textures.direction) + 32 * 14
-    assert sum(page.bytes for page in pages(textures)) == stored
+    assert sum(page.bytes for page in pack_pages(textures)) == stored
 
 
 def test_padding_of_many_is_small() -> None:
     textures = random_textures(np.zeros(1500, bool), seed=4, most_views=2)
-    (page,) = pages(textures)
+    (page,) = pack_pages(textures)
     assert page.padding < 0.06 * page.bytes
 
 
 def test_too_many_bytes_are_refused() -> None:
     textures = random_textures(MIXED, seed=5)
-    needed = sum(page.bytes + page.padding for page in pages(textures))
-    assert len(pages(textures, byte_budget=needed)) == 1
+    needed = sum(page.bytes + page.padding for page in pack_pages(textures))
+    assert len(pack_pages(textures, byte_budget=needed)) == 1
     message = rf"would take {needed} bytes; expected {needed - 1} at most \(byte_budget\)"
     with pytest.raises(ValueError, match=message):
-        pages(textures, byte_budget=needed - 1)
+        pack_pages(textures, byte_budget=needed - 1)
 
 
 def test_what_cannot_be_packed_is_refused() -> None:
     textures = random_textures(np.zeros(1, bool), ranks=16, tint_side=32, most_views=2)
     with pytest.raises(ValueError, match="do not fit on a page of 64 x 64 texels"):
-        pages(textures, 64)
+        pack_pages(textures, 64)
     other = random_textures(np.zeros(1, bool), ranks=16, tint_side=16, most_views=2)
     mixed = textures._replace(planes=(*textures.planes[:2], other.planes[2]))
     with pytest.raises(ValueError, match="sides of 32 and 16 texels; expected one"):
-        pages(mixed)
+        pack_pages(mixed)
     twice = random_textures(np.zeros(3, bool), seed=6)
     twice.direction[textures.first[0] :] = 7
     with pytest.raises(ValueError, match=r"has direction 7 .* times; expected each once"):
-        pages(twice)
+        pack_pages(twice)
 
 
 def test_nothing_makes_no_page() -> None:
-    assert pages(random_textures(np.zeros(0, bool))) == []
+    assert pack_pages(random_textures(np.zeros(0, bool))) == []

@@ -12,11 +12,11 @@ from pipelines.street_billboards.textures.decoding import (
     ViewPair,
     decodable,
     decode_colours,
-    decoded_views,
+    decode_views,
     view_pair,
 )
-from pipelines.street_billboards.textures.eigen_textures import alpha, decoded
-from pipelines.street_billboards.textures.forms import SIDE, CompressedTextures
+from pipelines.street_billboards.textures.eigen_textures import decode_billboard, unpack_masks
+from pipelines.street_billboards.textures.texture_tables import SIDE, CompressedTextures
 
 
 def random_textures(
@@ -68,15 +68,15 @@ def by_kernel(
 def test_views_are_decoded_as_by_numpy(seed: int, colour: str, side: int) -> None:
     textures = random_textures(seed, colour, (32, side, side))
     for b in range(10):
-        expected = decoded(textures, b)
+        expected = decode_billboard(textures, b)
         begin = textures.first[b]
         for i in range(len(expected)):
             np.testing.assert_allclose(by_kernel(textures, b, i, i, 0.0), expected[i], atol=0.01)
             out = np.empty((1, SIDE, SIDE, 4), np.uint8)
             position = np.array([float(textures.direction[begin + i])])
-            decoded_views(textures, np.array([b]), position, out)
+            decode_views(textures, np.array([b]), position, out)
             assert np.abs(out[0, ..., :3] - expected[i]).max() <= 0.51
-            masks = alpha(textures, b)
+            masks = unpack_masks(textures, b)
             assert ((out[0, ..., 3] == 255) == masks[i if len(masks) > 1 else 0]).all()
 
 
@@ -88,7 +88,7 @@ def test_views_between_are_interpolated() -> None:
     means[::2] += np.uint8(9)
     textures = textures._replace(scales=(quiet[0], quiet[1], quiet[2]), means=means)
     for b in np.flatnonzero(np.diff(textures.first) > 1):
-        views = decoded(textures, int(b))
+        views = decode_billboard(textures, int(b))
         low, high = textures.direction[textures.first[b] :][:2].astype(float)
         for fraction in (0.25, 0.5, 0.9):
             expected = (1 - fraction) * views[0] + fraction * views[1]
@@ -97,7 +97,7 @@ def test_views_between_are_interpolated() -> None:
             )
             out = np.empty((1, SIDE, SIDE, 4), np.uint8)
             position = np.array([low + fraction * (high - low)])
-            decoded_views(textures, np.array([b]), position, out)
+            decode_views(textures, np.array([b]), position, out)
             assert np.abs(out[0, ..., :3] - expected).max() <= 0.51
 
 
@@ -105,10 +105,10 @@ def test_masks_of_what_turns_are_blended() -> None:
     textures = random_textures(3)
     b = next(n for n in range(1, 10, 2) if np.diff(textures.first)[n] > 1)
     low, high = textures.direction[textures.first[b] :][:2].astype(float)
-    masks = alpha(textures, b)
+    masks = unpack_masks(textures, b)
     for fraction in (0.0, 0.4, 0.5, 0.6, 1.0):
         out = np.empty((1, SIDE, SIDE, 4), np.uint8)
-        decoded_views(textures, np.array([b]), np.array([low + fraction * (high - low)]), out)
+        decode_views(textures, np.array([b]), np.array([low + fraction * (high - low)]), out)
         blend = (1 - fraction) * masks[0] + fraction * masks[1]
         assert ((out[0, ..., 3] == 255) == (blend >= 0.5)).all()
 
@@ -134,10 +134,10 @@ def test_many_are_decoded_in_any_order() -> None:
     chosen = np.array([9, 0, 4, 4])
     position = np.array([3.3, 12.0, 40.0, 15.5])
     many = np.empty((4, SIDE, SIDE, 4), np.uint8)
-    decoded_views(decodable(textures), chosen, position, many)
+    decode_views(decodable(textures), chosen, position, many)
     for j in range(4):
         one = np.empty((1, SIDE, SIDE, 4), np.uint8)
-        decoded_views(textures, chosen[j : j + 1], position[j : j + 1], one)
+        decode_views(textures, chosen[j : j + 1], position[j : j + 1], one)
         assert (one[0] == many[j]).all()
 
 
@@ -148,5 +148,5 @@ def test_billboards_without_views_are_transparent() -> None:
     first_mask = np.append(textures.first_mask, textures.first_mask[-1])
     out = np.full((1, SIDE, SIDE, 4), 9, np.uint8)
     empty = textures._replace(first=first, ranks=ranks, first_mask=first_mask)
-    decoded_views(empty, np.array([10]), np.array([1.0]), out)
+    decode_views(empty, np.array([10]), np.array([1.0]), out)
     assert not out.any()

@@ -14,15 +14,21 @@ from skimage import data
 from skimage.transform import resize
 
 from pipelines.street_billboards.textures.eigen_textures import (
-    alpha,
     byte_counts,
-    compressed,
-    compressed_paper,
+    compress_views,
+    compress_views_as_paper,
+    decode_billboard,
     decode_error,
-    decoded,
+    unpack_masks,
 )
-from pipelines.street_billboards.textures.forms import EMPTY, SEEN, SIDE, UNSEEN, ViewTextures
-from pipelines.street_billboards.textures.masks import masks_of
+from pipelines.street_billboards.textures.masks import opacity_masks
+from pipelines.street_billboards.textures.texture_tables import (
+    EMPTY,
+    SEEN,
+    SIDE,
+    UNSEEN,
+    ViewTextures,
+)
 
 BLOCK_BYTES = 512
 """Of a view in BC1."""
@@ -95,7 +101,7 @@ def all_seen(views: int = 3) -> NDArray[np.uint8]:
 @pytest.mark.parametrize("error", [2.0, 3.0, 4.5])
 def test_the_error_asked_for_is_met_in_few_bytes(error: float) -> None:
     views, turns = photographed()
-    made = compressed(views, turns, error=error)
+    made = compress_views(views, turns, error=error)
     rmse, psnr = decode_error(views, made)
     assert 0.95 * error < rmse <= error
     assert psnr == pytest.approx(20 * np.log10(255 / rmse))
@@ -106,16 +112,16 @@ def test_the_error_asked_for_is_met_in_few_bytes(error: float) -> None:
 
 def test_one_number_of_planes_for_all_costs_more() -> None:
     views, turns = photographed()
-    even = compressed(views, turns, error=1e-3, most_ranks=(2, 1, 1))
+    even = compress_views(views, turns, error=1e-3, most_ranks=(2, 1, 1))
     assert (even.ranks == [2, 1, 1]).all()
-    made = compressed(views, turns, error=decode_error(views, even)[0])
+    made = compress_views(views, turns, error=decode_error(views, even)[0])
     assert byte_counts(made)["total"] < 0.9 * byte_counts(even)["total"]
 
 
 def test_decode_error_is_that_of_numpy() -> None:
     views, turns = photographed()
-    made = compressed(views, turns, error=4.0)
-    pictures = np.concatenate([decoded(made, b) for b in range(len(turns))])
+    made = compress_views(views, turns, error=4.0)
+    pictures = np.concatenate([decode_billboard(made, b) for b in range(len(turns))])
     off = np.rint(pictures).astype(float) - views.colours
     rmse = np.sqrt((off[views.states == SEEN] ** 2).mean())
     assert decode_error(views, made)[0] == pytest.approx(rmse, rel=1e-3)
@@ -125,8 +131,8 @@ def test_what_nobody_saw_does_not_matter() -> None:
     views, turns = photographed()
     noise = np.random.default_rng(5).integers(0, 256, views.colours.shape, dtype=np.uint8)
     colours = np.where((views.states == SEEN)[..., None], views.colours, noise)
-    one = compressed(views, turns, error=4.0)
-    other = compressed(views._replace(colours=colours), turns, error=4.0)
+    one = compress_views(views, turns, error=4.0)
+    other = compress_views(views._replace(colours=colours), turns, error=4.0)
     for a, b in zip(one.planes + one.weights, other.planes + other.weights, strict=True):
         assert (a == b).all()
 
@@ -138,8 +144,8 @@ def test_gaps_are_filled_with_what_other_views_saw() -> None:
     states = all_seen(4)
     for i in range(4):
         states[i, 8 * i : 8 * i + 8] = UNSEEN
-    made = compressed(views_from([textures], [states]), np.zeros(1, np.bool_), error=0.5)
-    off = decoded(made, 0) - textures
+    made = compress_views(views_from([textures], [states]), np.zeros(1, np.bool_), error=0.5)
+    off = decode_billboard(made, 0) - textures
     assert np.sqrt((off**2).mean()) < 1.5
 
 
@@ -148,17 +154,17 @@ def test_holes_take_the_colours_around_them() -> None:
     texture[:, :, 16:] = 200
     states = all_seen()
     states[:, 10:12, 24:26] = UNSEEN
-    made = compressed(views_from([texture], [states]), np.zeros(1, np.bool_), error=1.0)
-    assert np.abs(decoded(made, 0)[:, 10:12, 24:26] - 200.0).max() < 5.0
-    assert alpha(made, 0)[0, 10:12, 24:26].all()
+    made = compress_views(views_from([texture], [states]), np.zeros(1, np.bool_), error=1.0)
+    assert np.abs(decode_billboard(made, 0)[:, 10:12, 24:26] - 200.0).max() < 5.0
+    assert unpack_masks(made, 0)[0, 10:12, 24:26].all()
 
 
 def test_flat_billboards_have_no_planes() -> None:
-    made = compressed(
+    made = compress_views(
         views_from([flat((200, 100, 50))], [all_seen()]), np.zeros(1, np.bool_), error=1.0
     )
     assert (made.ranks == 0).all()
-    assert np.abs(decoded(made, 0) - [200, 100, 50]).max() <= 2.0
+    assert np.abs(decode_billboard(made, 0) - [200, 100, 50]).max() <= 2.0
 
 
 @settings(deadline=None, max_examples=10)
@@ -168,7 +174,7 @@ def test_ranks_never_exceed_views_and_rounding_is_small(seed: int, side: int) ->
     count = int(random.integers(1, 4))
     textures = random.integers(0, 256, (count, SIDE, SIDE, 3), dtype=np.uint8)
     views = views_from([textures], [all_seen(count)])
-    made = compressed(views, np.zeros(1, np.bool_), error=0.5, colour="rgb", chroma_side=side)
+    made = compress_views(views, np.zeros(1, np.bool_), error=0.5, colour="rgb", chroma_side=side)
     assert (made.ranks <= count).all()
     # Noise needs every component. Then all error is rounding: of planes, weights and means.
     steps = sum(float(scales.max(initial=0)) for scales in made.scales) / 127.0
@@ -182,7 +188,10 @@ def test_empty_billboards_and_views_are_harmless(turning: bool) -> None:
         [nothing, flat((9, 9, 9), 2)], [nothing[..., 0], np.full((2, SIDE, SIDE), EMPTY, np.uint8)]
     )
     turns = np.full(2, turning)
-    for made in (compressed(views, turns, error=4.0), compressed_paper(views, turns, rank=2)):
+    for made in (
+        compress_views(views, turns, error=4.0),
+        compress_views_as_paper(views, turns, rank=2),
+    ):
         assert not made.masks.any()
         assert decode_error(views, made)[0] == 0.0
 
@@ -196,20 +205,23 @@ def test_permuted_billboards_give_permuted_results() -> None:
         [views.states[r] for r in rows],
         [list(views.direction[r]) for r in rows],
     )
-    one, other = compressed(views, turns, error=4.0), compressed(moved, turns[order], error=4.0)
+    one, other = (
+        compress_views(views, turns, error=4.0),
+        compress_views(moved, turns[order], error=4.0),
+    )
     assert (one.ranks[order] == other.ranks).all()
     for place, b in enumerate(order):
-        assert (decoded(one, int(b)) == decoded(other, place)).all()
+        assert (decode_billboard(one, int(b)) == decode_billboard(other, place)).all()
 
 
 def test_views_can_count_more() -> None:
     views, turns = photographed()
     weights = np.where(np.arange(len(views.direction)) % 5 == 0, 30.0, 1.0)
     pictures = [
-        np.concatenate([decoded(made, b) for b in range(len(turns))])[::5]
+        np.concatenate([decode_billboard(made, b) for b in range(len(turns))])[::5]
         for made in (
-            compressed(views, turns, error=1e-3, most_ranks=(1, 1, 1)),
-            compressed(views, turns, error=1e-3, most_ranks=(1, 1, 1), view_weights=weights),
+            compress_views(views, turns, error=1e-3, most_ranks=(1, 1, 1)),
+            compress_views(views, turns, error=1e-3, most_ranks=(1, 1, 1), view_weights=weights),
         )
     ]
     seen = views.states[::5] == SEEN
@@ -220,19 +232,19 @@ def test_views_can_count_more() -> None:
 def test_options_that_do_not_exist_are_refused() -> None:
     views, turns = photographed(20)
     with pytest.raises(ValueError, match="chroma_side is 12"):
-        compressed(views, turns, error=4.0, chroma_side=12)
+        compress_views(views, turns, error=4.0, chroma_side=12)
     with pytest.raises(ValueError, match='colour is "hsv"'):
-        compressed(views, turns, error=4.0, colour="hsv")  # type: ignore[arg-type]
+        compress_views(views, turns, error=4.0, colour="hsv")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="error is 0"):
-        compressed(views, turns, error=0.0)
+        compress_views(views, turns, error=0.0)
     with pytest.raises(ValueError, match="turns has 19 entries; expected 20"):
-        compressed(views, turns[1:], error=4.0)
+        compress_views(views, turns[1:], error=4.0)
     with pytest.raises(ValueError, match="rank and contribution are None"):
-        compressed_paper(views, turns, rank=None)
+        compress_views_as_paper(views, turns, rank=None)
     with pytest.raises(ValueError, match="rank is 33"):
-        compressed_paper(views, turns, rank=33)
+        compress_views_as_paper(views, turns, rank=33)
     with pytest.raises(ValueError, match=r"contribution is 1\.5"):
-        compressed_paper(views, turns, contribution=1.5)
+        compress_views_as_paper(views, turns, contribution=1.5)
 
 
 # ---- bytes -------------------------------------------------------------------------------------
@@ -240,7 +252,7 @@ def test_options_that_do_not_exist_are_refused() -> None:
 
 def test_bytes_add_up_to_the_arrays() -> None:
     views, turns = photographed()
-    made = compressed(views, turns, error=4.0)
+    made = compress_views(views, turns, error=4.0)
     counts = byte_counts(made)
     codes = [made.direction, made.means, made.masks, *made.planes, *made.weights]
     stored = sum(array.nbytes for array in codes) + sum(one.nbytes for one in made.scales)
@@ -253,7 +265,7 @@ def test_bytes_add_up_to_the_arrays() -> None:
 
 def test_the_papers_bytes() -> None:
     views, turns = photographed(20)
-    made = compressed_paper(views, turns)
+    made = compress_views_as_paper(views, turns)
     counts = byte_counts(made)
     assert counts["eigen"] == 20 * 49_152
     assert counts["weights"] == 20 * 1536
@@ -267,14 +279,14 @@ def test_the_papers_bytes() -> None:
 
 def test_the_papers_form_holds_all_views_where_planes_suffice() -> None:
     views, turns = photographed(20)
-    made = compressed_paper(views, turns, rank=5)
+    made = compress_views_as_paper(views, turns, rank=5)
     assert decode_error(views, made)[0] < 1.0
     assert (made.direction.reshape(20, 32) == np.arange(32)).all()
 
 
 def test_directions_without_a_view_are_as_the_nearest() -> None:
     views, turns = photographed(20)
-    pictures = decoded(compressed_paper(views, turns, rank=5), 2)
+    pictures = decode_billboard(compress_views_as_paper(views, turns, rank=5), 2)
     # Observed are 3, 5, 7, 9, 11.
     assert (pictures[0] == pictures[3]).all()
     assert (pictures[4] == pictures[3]).all()
@@ -285,7 +297,7 @@ def test_directions_without_a_view_are_as_the_nearest() -> None:
 def test_contribution_chooses_ranks_as_numpy_would() -> None:
     views, turns = photographed(20)
     views = views._replace(states=np.full_like(views.states, SEEN))
-    made = compressed_paper(views, turns, rank=None, contribution=0.97)
+    made = compress_views_as_paper(views, turns, rank=None, contribution=0.97)
     nearest = np.abs(np.arange(32)[:, None] - views.direction[:5].astype(int)).argmin(axis=1)
     for b in range(20):
         for c in range(3):
@@ -294,7 +306,7 @@ def test_contribution_chooses_ranks_as_numpy_would() -> None:
             lengths = np.linalg.svd(rows, compute_uv=False)
             share = np.cumsum(lengths**2) / (lengths**2).sum()
             assert made.ranks[b, c] == np.argmax(share >= 0.97) + 1
-    fewer = compressed_paper(views, turns, rank=1, contribution=0.999)
+    fewer = compress_views_as_paper(views, turns, rank=1, contribution=0.999)
     assert fewer.ranks.max() == 1
 
 
@@ -303,7 +315,7 @@ def test_contribution_chooses_ranks_as_numpy_would() -> None:
 
 def mask_of(states: NDArray[np.uint8], *, turning: bool = False) -> NDArray[np.bool_]:
     views = views_from([flat((0, 0, 0), len(states))], [states])
-    first, masks = masks_of(views, np.array([turning]))
+    first, masks = opacity_masks(views, np.array([turning]))
     assert first[-1] == len(masks) == (len(states) if turning else 1)
     return np.unpackbits(masks, axis=-1).astype(np.bool_)
 
@@ -339,6 +351,6 @@ def test_masks_are_the_bits_from_the_left() -> None:
     states = np.full((1, SIDE, SIDE), EMPTY, np.uint8)
     states[0, 0, :9] = SEEN
     views = views_from([flat((0, 0, 0), 1)], [states])
-    made = compressed(views, np.zeros(1, np.bool_), error=4.0)
+    made = compress_views(views, np.zeros(1, np.bool_), error=4.0)
     assert made.masks[0, 0].tolist() == [255, 128, 0, 0]
-    assert alpha(made, 0).sum() == 9
+    assert unpack_masks(made, 0).sum() == 9

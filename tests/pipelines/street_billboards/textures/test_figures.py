@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.street_billboards.capture.point_fusion import FrameViews
-from pipelines.street_billboards.textures.atlases import pages
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
+from pipelines.street_billboards.textures.atlases import pack_pages
 from pipelines.street_billboards.textures.figures import (
     decoded_rmse,
     sampling_error,
     unpacked_error,
 )
-from pipelines.street_billboards.textures.forms import SEEN, SIDE, UNSEEN, ViewTextures
+from pipelines.street_billboards.textures.texture_tables import SEEN, SIDE, UNSEEN, ViewTextures
 from pipelines.street_billboards.textures.view_textures import view_textures
 from tests.pipelines.street_billboards.compressed_street import random_textures
 from tests.pipelines.street_billboards.painted_wall import VOXEL, Scene, on_the_wall
@@ -28,10 +28,10 @@ MIXED = np.arange(9) % 3 == 0
 )
 def test_pages_read_as_they_were_packed(colour: str, tint_side: int) -> None:
     textures = random_textures(MIXED, colour=colour, tint_side=tint_side)
-    assert unpacked_error(pages(textures), textures) < 1e-3
+    assert unpacked_error(pack_pages(textures), textures) < 1e-3
     # On several pages, too.
     textures = random_textures(MIXED, colour=colour, tint_side=tint_side, ranks=(6, 1, 3))
-    small = pages(textures, 96)
+    small = pack_pages(textures, 96)
     assert len(small) > 1
     assert unpacked_error(small, textures) < 1e-3
 
@@ -39,7 +39,7 @@ def test_pages_read_as_they_were_packed(colour: str, tint_side: int) -> None:
 def spoilt_byte(part: str) -> float:
     """The error when one byte of the first billboard's part of a page is another."""
     textures = random_textures(MIXED, ranks=(4, 2, 2), most_views=4, opaque=True)
-    page = pages(textures)[0]
+    page = pack_pages(textures)[0]
     if part in ("detail", "tint"):
         atlas = getattr(page, part)
         texels = atlas.texels.copy()
@@ -61,7 +61,7 @@ def test_a_spoilt_byte_shows(part: str) -> None:
 
 def test_a_record_of_another_billboard_shows() -> None:
     textures = random_textures(np.zeros(4, bool), ranks=(4, 2, 2), most_views=1, opaque=True)
-    page = pages(textures)[0]
+    page = pack_pages(textures)[0]
     assert unpacked_error([page._replace(records=page.records[::-1])], textures) > 10.0
 
 
@@ -125,14 +125,14 @@ def street(request: pytest.FixtureRequest):  # type: ignore[no-untyped-def]
     photographs = Scene().photographs(spots, size=(140, 120))
     walls = on_the_wall([(x, 0.0, 0.4) for x in (-0.7, 0.2, 0.9)], turns=request.param)
     views = view_textures(walls, VOXEL, photographs)
-    frames = FrameViews(
+    frames = RgbdViews(
         photographs.depth,
         photographs.deviation,
         photographs.pixels,
         photographs.intrinsics,
         photographs.to_world,
     )
-    return walls, views, frames, photographs.codes
+    return walls, views, frames, photographs.exposure_lut
 
 
 def test_right_textures_differ_little_from_the_photographs(street) -> None:  # type: ignore[no-untyped-def]

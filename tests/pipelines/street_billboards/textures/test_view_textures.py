@@ -7,9 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.billboards import OVERLAP, turned_axes
-from pipelines.street_billboards.capture.exposure import evening_codes
-from pipelines.street_billboards.textures.forms import EMPTY, SEEN, SIDE, UNSEEN, joined
+from pipelines.street_billboards.billboards import OVERLAP, axes_facing
+from pipelines.street_billboards.capture.exposure import exposure_lut
+from pipelines.street_billboards.textures.texture_tables import (
+    EMPTY,
+    SEEN,
+    SIDE,
+    UNSEEN,
+    join_views,
+)
 from pipelines.street_billboards.textures.view_directions import fan_position
 from pipelines.street_billboards.textures.view_textures import view_textures
 from tests.pipelines.street_billboards.painted_wall import (
@@ -133,14 +139,14 @@ def test_the_next_best_photograph_fills_in() -> None:
 def test_codes_even_out_exposures() -> None:
     photographs = Scene().photographs(ROW)
     gains = np.exp(np.random.default_rng(0).normal(0, 0.3, (len(ROW), 3)))
-    taken = evening_codes(1 / gains)
+    taken = exposure_lut(1 / gains)
     exposed = np.stack(
         [codes[shot, np.arange(3)] for codes, shot in zip(taken, photographs.pixels, strict=True)]
     )
     assert (exposed != photographs.pixels).any()
     wall = on_the_wall()
     found = view_textures(
-        wall, VOXEL, photographs._replace(pixels=exposed, codes=evening_codes(gains))
+        wall, VOXEL, photographs._replace(pixels=exposed, exposure_lut=exposure_lut(gains))
     )
     truth = painting(texel_points(wall, 0))
     assert np.abs(found.colours[found.states == SEEN].mean(axis=0) - truth.mean((0, 1))).max() < 1.5
@@ -183,7 +189,7 @@ def test_what_turns_is_seen_only_where_depth_lies_in_the_voxel(deviation: float)
     for k, eye in enumerate(photographs.to_world[:, :3, 3]):
         place = int(np.rint(fan_position(eye - tree.centre[0], FAN)))
         view = int(np.flatnonzero(found.direction == place)[0])
-        row, column = turned_axes(tree.centre[0], eye)
+        row, column = axes_facing(tree.centre[0], eye)
         half = tree.half_s[0, 0]
         for y in range(SIDE):
             for x in range(SIDE):
@@ -230,7 +236,7 @@ def test_billboards_may_be_done_in_parts() -> None:
     photographs = Scene(end=0.4, pole=(0.1, -1.5, 0.06)).photographs(ROW)
     walls = on_the_wall([(x, 0.0, 0.0) for x in (-1.0, 0.0, 0.5, 4.5)])
     whole = view_textures(walls, VOXEL, photographs)
-    parts = joined(
+    parts = join_views(
         [
             view_textures(type(walls)(*(array[rows] for array in walls)), VOXEL, photographs)
             for rows in (slice(0, 1), slice(1, 4))

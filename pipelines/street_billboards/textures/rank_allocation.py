@@ -18,7 +18,7 @@ _LEAST, _MOST = -20.0, 40.0
 _BISECTIONS = 50
 
 
-class Choice(NamedTuple):
+class RankAllocation(NamedTuple):
     """Of b billboards."""
 
     ranks: NDArray[np.uint8]
@@ -27,18 +27,23 @@ class Choice(NamedTuple):
     """Sum of squares that this leaves, as foretold."""
 
 
-def chosen(squares: Floats, costs: Floats, allowed: float) -> Choice:
+def allocate_ranks(squares: Floats, costs: Floats, allowed: float) -> RankAllocation:
     """The fewest bytes that leave ``allowed`` at most, or as little as can be.
 
     squares, costs (b, 3, ranks): sums of squares that ranks leave (infinity where there is no such
     rank), and their bytes. The exchange rate is found by bisection: the result does not depend on
     the order of billboards.
+
+    >>> left = np.array([[[90.0, 30.0, 20.0]] * 3, [[50.0, 45.0, 44.0]] * 3])
+    >>> found = allocate_ranks(left, np.broadcast_to(np.arange(3.0) * 1024, left.shape), 240.0)
+    >>> found.ranks.tolist(), found.squares
+    ([[1, 1, 1], [0, 0, 0]], 240.0)
     """
 
-    def at(rate: float) -> Choice:
+    def at(rate: float) -> RankAllocation:
         ranks = (squares + rate * costs).argmin(axis=2)
         left = np.take_along_axis(squares, ranks[:, :, None], 2).sum()
-        return Choice(ranks.astype(np.uint8), float(left))
+        return RankAllocation(ranks.astype(np.uint8), float(left))
 
     low, high = _LEAST, _MOST
     if at(2.0**low).squares > allowed:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.capture.point_fusion import FrameViews
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
 
 MOST_POINTS = 20_000
 """Points that are looked for: gains need no more."""
@@ -30,7 +30,9 @@ class Observations(NamedTuple):
         return self._replace(photograph=self.photograph + photographs)
 
 
-def observed(positions: NDArray[np.float64], views: FrameViews, *, farthest: float) -> Observations:
+def observe_points(
+    positions: NDArray[np.float64], views: RgbdViews, *, farthest: float
+) -> Observations:
     """Points (n, 3) where the photographs' depth maps have them, up to ``farthest`` metres."""
     points = np.arange(0, len(positions), max(len(positions) // MOST_POINTS, 1))
     _, height, width = views.depth.shape

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Stage
 from pipelines.street_billboards.billboards import Billboards
-from pipelines.street_billboards.capture.sky import rays_of, sky_along
+from pipelines.street_billboards.capture.sky import pixel_rays, sky_along
 from pipelines.street_billboards.drawing.processor_street import ProcessorStreet
 from pipelines.street_billboards.drawing.shader_street import ShaderStreet
 from pipelines.street_billboards.drawing.stage_camera import stage_camera
 from pipelines.street_billboards.textures.atlases import Page
-from pipelines.street_billboards.textures.forms import CompressedTextures
+from pipelines.street_billboards.textures.texture_tables import CompressedTextures
 
 FloatArray = NDArray[np.float64]
 
 
-class View(NamedTuple):
+class StreetPicture(NamedTuple):
     """A picture of the street, linear light."""
 
     alone: NDArray[np.float32]
@@ -67,19 +67,25 @@ class StreetStage:
     ) -> None:
         self._stage.__exit__(kind, error, trace)
 
-    def view(self, intrinsics: FloatArray, to_world: FloatArray) -> View:
+    def view(self, intrinsics: FloatArray, to_world: FloatArray) -> StreetPicture:
         """What a camera (K (3, 3), pose (4, 4)) sees."""
         width, height = self._size
         sent = self._street.look(intrinsics, to_world, width, height)
         self._stage.look(stage_camera(intrinsics, to_world, height))
         drawn = self._stage.radiance()
         alone, covered = drawn[..., :3], drawn[..., 3]
-        behind = sky_along(self._sky, rays_of(intrinsics, to_world, width, height))
-        return View(alone, alone + (1 - covered[..., None]) * behind, covered, sent)
+        behind = sky_along(self._sky, pixel_rays(intrinsics, to_world, width, height))
+        return StreetPicture(alone, alone + (1 - covered[..., None]) * behind, covered, sent)
 
 
-def flight(poses: FloatArray, frames: int, swerve: float) -> FloatArray:
-    """Poses (frames, 4, 4) along those of a drive (f, 4, 4), swerving ``swerve`` m to the left."""
+def flight_poses(poses: FloatArray, frames: int, swerve: float) -> FloatArray:
+    """Poses (frames, 4, 4) along those of a drive (f, 4, 4), swerving ``swerve`` m to the left.
+
+    >>> drive = np.tile(np.eye(4), (3, 1, 1))
+    >>> drive[:, 2, 3] = [0.0, 3.0, 6.0]
+    >>> flight_poses(drive, 5, swerve=1.0)[:, [0, 2], 3].round(3).tolist()
+    [[0.0, 0.0], [-0.5, 1.5], [-1.0, 3.0], [-0.5, 4.5], [-0.0, 6.0]]
+    """
     from scipy.spatial.transform import Rotation, Slerp
 
     at = np.linspace(0, len(poses) - 1, frames)
@@ -94,7 +100,7 @@ def flight(poses: FloatArray, frames: int, swerve: float) -> FloatArray:
     return made
 
 
-def compared(
+def shader_and_processor_pictures(
     billboards: Billboards,
     pages: list[Page],
     textures: CompressedTextures,

@@ -17,7 +17,9 @@ def centred_intrinsics(
     return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
 
 
-def centred(photographs: NDArray[np.uint8], intrinsics: NDArray[np.float64]) -> NDArray[np.uint8]:
+def centre_photographs(
+    photographs: NDArray[np.uint8], intrinsics: NDArray[np.float64]
+) -> NDArray[np.uint8]:
     """Photographs (c, y, x, 3) of cameras with K (c, 3, 3), taken anew with ``centred_intrinsics``.
 
     Those that have it already come back as they are.

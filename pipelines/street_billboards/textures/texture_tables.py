@@ -67,7 +67,7 @@ class CompressedTextures(NamedTuple):
     """(m, 32, 4), alpha, a bit a texel, the leftmost in a byte's highest bit."""
 
 
-def joined(parts: list[ViewTextures]) -> ViewTextures:
+def join_views(parts: list[ViewTextures]) -> ViewTextures:
     """One table of several, billboard after billboard; the list is empty afterwards.
 
     Parts are let go one by one, so that not everything is there twice.

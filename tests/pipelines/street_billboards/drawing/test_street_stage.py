@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pipelines.street_billboards.drawing.frames import flight
+from pipelines.street_billboards.drawing.street_stage import flight_poses
 
 
 def drive(count: int) -> NDArray[np.float64]:
@@ -24,7 +24,7 @@ def drive(count: int) -> NDArray[np.float64]:
 @pytest.mark.parametrize(("count", "frames"), [(2, 5), (8, 8), (8, 41), (30, 7)])
 def test_a_flight_begins_and_ends_as_the_drive(count: int, frames: int) -> None:
     poses = drive(count)
-    made = flight(poses, frames, 1.4)
+    made = flight_poses(poses, frames, 1.4)
     assert made.shape == (frames, 4, 4)
     np.testing.assert_allclose(made[[0, -1]], poses[[0, -1]], atol=1e-9)
     product = made[:, :3, :3] @ made[:, :3, :3].transpose(0, 2, 1)
@@ -34,13 +34,13 @@ def test_a_flight_begins_and_ends_as_the_drive(count: int, frames: int) -> None:
 
 def test_a_flight_without_swerving_passes_through_the_poses() -> None:
     poses = drive(6)
-    np.testing.assert_allclose(flight(poses, 26, 0.0)[::5], poses, atol=1e-9)
+    np.testing.assert_allclose(flight_poses(poses, 26, 0.0)[::5], poses, atol=1e-9)
 
 
 @pytest.mark.parametrize("swerve", [1.4, -0.6])
 def test_a_flight_swerves_to_the_left_by_so_much(swerve: float) -> None:
     poses = drive(9)
-    straight, made = flight(poses, 33, 0.0), flight(poses, 33, swerve)
+    straight, made = flight_poses(poses, 33, 0.0), flight_poses(poses, 33, swerve)
     own = np.linalg.inv(straight) @ made
     np.testing.assert_allclose(own[:, 1:3, 3], 0.0, atol=1e-9)
     left = -own[:, 0, 3] / swerve

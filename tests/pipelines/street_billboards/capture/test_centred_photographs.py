@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.ndimage import center_of_mass
 
-from pipelines.street_billboards.capture.centred_pictures import centred, centred_intrinsics
+from pipelines.street_billboards.capture.centred_photographs import (
+    centre_photographs,
+    centred_intrinsics,
+)
 
 WIDTH, HEIGHT = 12, 9
 
@@ -45,7 +48,7 @@ def test_a_point_lands_where_the_new_lens_says() -> None:
         y, x = np.mgrid[:height, :width]
         spot = np.exp(-((x - before[0]) ** 2 + (y - before[1]) ** 2) / (2 * 2.0**2))
         picture = np.rint(200 * spot)[..., None].repeat(3, axis=2).astype(np.uint8)
-        made = centred(picture[None], lens[None])[0]
+        made = centre_photographs(picture[None], lens[None])[0]
         row, column = center_of_mass(made[..., 0].astype(float))
         assert (column, row) == pytest.approx(pixel, abs=0.05)
 
@@ -57,6 +60,6 @@ def test_a_centred_photograph_stays_as_it_is() -> None:
     other = lens.copy()
     other[0, 2] += 3
     np.testing.assert_allclose(centred_intrinsics(lens, 60, 40), lens)
-    made = centred(pictures, np.stack([lens, other]))
+    made = centre_photographs(pictures, np.stack([lens, other]))
     np.testing.assert_array_equal(made[0], pictures[0])
     assert (made[1] != pictures[1]).any()
