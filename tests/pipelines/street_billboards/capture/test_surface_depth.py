@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.geometry.cameras import project_points
-from pipelines.street_billboards.capture.surface_depth import surface_depth
+from pipelines.street_billboards.capture.point_fusion import RgbdViews
+from pipelines.street_billboards.capture.surface_depth import fill_unknown_depth, surface_depth
 from tests.pipelines.street_billboards.compressed_street import placed_camera
 
 WIDTH, HEIGHT = 24, 17
@@ -55,3 +56,42 @@ def test_no_points_no_depth() -> None:
     lens, pose = placed_camera((0, -4.0, 0), (0, 0, 0), (WIDTH, HEIGHT), 15.0)
     found = surface_depth(np.empty((0, 3)), 1.0, lens, pose, WIDTH, HEIGHT, farthest=50.0)
     assert np.isinf(found).all()
+
+
+# ---- what stereo left open -------------------------------------------------------------------
+
+
+def _views(depth: float) -> RgbdViews:
+    """Two cameras before a wall, of whose depths every third is unknown."""
+    lens, pose = placed_camera((0, -4.0, 0), (0, 0, 0), (WIDTH, HEIGHT), 15.0)
+    known = np.full((2, HEIGHT, WIDTH), depth, np.float32)
+    known[:, ::3] = np.nan
+    known[:, 1::3] = np.inf
+    deviation = np.full_like(known, 0.02)
+    beside = pose.copy()
+    beside[0, 3] += 0.5
+    photographs = np.zeros((2, HEIGHT, WIDTH, 3), np.uint8)
+    return RgbdViews(
+        known, deviation, photographs, np.stack([lens, lens]), np.stack([pose, beside])
+    )
+
+
+def test_only_unknown_depths_become_those_of_points() -> None:
+    x, z = np.meshgrid(np.arange(-5, 5, 0.05), np.arange(-4, 4, 0.05))
+    wall = np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])
+    views = _views(3.0)
+    fill_unknown_depth(views, wall, farthest=40.0)
+    np.testing.assert_allclose(views.depth[:, ::3], 4.0, rtol=1e-6)
+    np.testing.assert_array_equal(views.depth[:, 2::3], 3.0)
+    assert np.isinf(views.depth[:, 1::3]).all()
+    np.testing.assert_allclose(views.deviation[:, ::3], 0.1)
+    np.testing.assert_allclose(views.deviation[:, 2::3], 0.02)
+
+
+def test_points_a_little_beyond_the_farthest_billboard_count_and_others_do_not() -> None:
+    x, z = np.meshgrid(np.arange(-30, 30, 0.2), np.arange(-30, 30, 0.2))
+    for away, seen in ((14.0, True), (17.0, False)):
+        wall = np.column_stack([x.ravel(), np.full(x.size, away - 4.0), z.ravel()])
+        views = _views(3.0)
+        fill_unknown_depth(views, wall, farthest=5.0)
+        assert np.isfinite(views.depth[:, ::3]).any() == seen
