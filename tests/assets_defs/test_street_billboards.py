@@ -11,13 +11,17 @@ import cv2
 import numpy as np
 import pytest
 
+import tsuya
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from assets_defs.street_billboards.datasets import compressed_of, pages_of, views_of
 from assets_defs.street_billboards.graph import STREET
+from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import billboards, figures, octree
 from pipelines.street_billboards.capture import exposure, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, processor_street, quads, street_stage
+from pipelines.street_billboards.frames import draw_view
+from pipelines.street_billboards.street_model import StreetModel
 from pipelines.street_billboards.textures import atlases, eigen_textures, view_textures
 from pipelines.street_billboards.textures.texture_tables import SEEN
 from pipelines.virtual.city import drive as city_drive
@@ -70,6 +74,22 @@ def test_stored_textures_and_pages_read_back(good: Any) -> None:
         np.testing.assert_array_equal(stored.records, packed.records)
         np.testing.assert_array_equal(stored.masks, packed.masks)
     assert int(_open(good, "eigen_textures")["bytes"]) < 98_304 * len(textures.ranks) / 8
+
+
+def test_stored_streets_load_as_what_they_are_drawn_from(good: Any) -> None:
+    root = good.workspace.store.root
+
+    def load(asset: str) -> Any:
+        return tsuya.load(f"street_billboards/{asset}/city", root)
+
+    made, pages, textures = map(load, ("billboards", "texture_atlases", "eigen_textures"))
+    drive, shown = load("drive_frames"), load("street_frames")
+    street = StreetModel(made, pages, textures, load("depth_maps")["sky"].values)
+    size = (drive.sizes["x"], drive.sizes["y"])
+    pose = moved_left(drive["poses"].values[5, 1], 1.0)
+    picture = draw_view(street, drive["intrinsics"].values[1], pose, size)
+    np.testing.assert_array_equal(picture, shown["beside"].values[0, 0])
+    assert load("view_textures").first[-1] == len(load("view_textures").colours)
 
 
 def test_the_papers_form_and_plain_sampling(make_house: Any, good: Any) -> None:
