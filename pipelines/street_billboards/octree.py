@@ -35,16 +35,16 @@ class Leaves(NamedTuple):
         return middles
 
 
-def octree_leaves(positions: NDArray[np.floating], side: float, least: int) -> Leaves:
+def octree_leaves(positions: NDArray[np.floating], side: float, least_points: int) -> Leaves:
     """Split the points' cube until its leaves have this side, in metres; keep those with enough.
 
     positions (n, 3); the root is the smallest cube of side ``2 ** depth * side`` that holds all,
-    its corner on a multiple of ``side``. least: points that a leaf must hold.
+    its corner on a multiple of ``side``. least_points: that a leaf must hold.
 
     Raises ValueError where there are no points, or more than 20 levels would be needed.
 
     >>> points = np.random.default_rng(0).uniform(0, 2, (1000, 3))
-    >>> leaves = octree_leaves(points, side=0.5, least=5)
+    >>> leaves = octree_leaves(points, side=0.5, least_points=5)
     >>> leaves.depth, leaves.cell.shape, len(leaves.order)
     (2, (64, 3), 1000)
     """
@@ -62,7 +62,7 @@ def octree_leaves(positions: NDArray[np.floating], side: float, least: int) -> L
     code = morton_codes(cell)
     order = np.argsort(code, kind="stable")
     _, first, counts = np.unique(code[order], return_index=True, return_counts=True)
-    enough = counts >= least
+    enough = counts >= least_points
     kept = np.repeat(enough, counts)
     return Leaves(
         corner,

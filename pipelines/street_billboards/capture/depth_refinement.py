@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from pipelines.street_billboards.capture.slanted_windows import (
     RELAXED,
     RUN,
-    fit_planes,
+    fit_disparity_planes,
     padded_to_runs,
 )
 from pipelines.street_billboards.capture.weighted_median import disparity_edges, weighted_median
@@ -67,7 +67,7 @@ def refine_disparities(
     that look different are left out, pixel by pixel.
     """
     cleaned = weighted_median(disparity, photograph, disparity_edges(disparity), 6, 2)
-    smooth, across, down = fit_planes(cleaned, 2, 0.5)
+    smooth, across, down = fit_disparity_planes(cleaned, 2, 0.5)
     ours = np.ascontiguousarray(grey, dtype=np.float32)
     compared = [
         _grey_differences(smooth, ours, one.grey.astype(np.float32), one.turn, one.shift)
@@ -75,7 +75,7 @@ def refine_disparities(
     ]
     errors, slopes = (np.stack(both) for both in zip(*compared, strict=True))
     moved, told = _moved(smooth, across, down, ours, errors, slopes)
-    answer = fit_planes(moved, 2, 0.4)[0]
+    answer = fit_disparity_planes(moved, 2, 0.4)[0]
     # There, windows hold two surfaces.
     told[disparity_edges(answer)] *= 0.5
     return answer, told

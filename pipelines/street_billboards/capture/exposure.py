@@ -16,7 +16,7 @@ def exposure_gains(
     point: NDArray[np.integer],
     photograph: NDArray[np.integer],
     radiance: NDArray[np.floating],
-    photographs: int,
+    photograph_count: int,
 ) -> NDArray[np.float64]:
     """Factors (photographs, channels) of linear light by which photographs are brighter.
 
@@ -31,21 +31,23 @@ def exposure_gains(
     array([2.])
     """
     logs = np.log(np.asarray(radiance, np.float64))
-    gains = np.zeros((photographs, logs.shape[1]))
+    gains = np.zeros((photograph_count, logs.shape[1]))
     points = int(point.max()) + 1 if len(point) else 0
     for channel in range(logs.shape[1]):
         weight = np.ones(len(point))
         for _ in range(_ROUNDS):
             # Points are eliminated: each leaves the differences to its weighted mean.
             total = np.maximum(np.bincount(point, weight, points), 1e-12)
-            matrix = np.zeros((photographs, photographs))
+            matrix = np.zeros((photograph_count, photograph_count))
             np.add.at(matrix, (photograph, photograph), weight)
-            matrix -= _shared(point, photograph, weight, total, photographs)
+            matrix -= _shared(point, photograph, weight, total, photograph_count)
             mean = np.bincount(point, weight * logs[:, channel], points) / total
-            right = np.bincount(photograph, weight * (logs[:, channel] - mean[point]), photographs)
+            right = np.bincount(
+                photograph, weight * (logs[:, channel] - mean[point]), photograph_count
+            )
             # Just enough to have a solution: a drift along many photographs is held by little more.
-            typical = float(matrix.trace()) / max(photographs, 1)
-            matrix[np.diag_indices(photographs)] += 1e-9 * max(typical, 1e-9)
+            typical = float(matrix.trace()) / max(photograph_count, 1)
+            matrix[np.diag_indices(photograph_count)] += 1e-9 * max(typical, 1e-9)
             found = np.linalg.solve(matrix, right)
             found -= found.mean()
             rest = logs[:, channel] - found[photograph]

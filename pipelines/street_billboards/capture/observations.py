@@ -11,7 +11,7 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.geometry.cameras import project_points
 from pipelines.street_billboards.capture.point_fusion import RgbdViews
 
-MOST_POINTS = 20_000
+_MOST_POINTS = 20_000
 """Points that are looked for: gains need no more."""
 _DARKEST, _BRIGHTEST = 8, 247
 """Codes between which a camera tells how bright something is."""
@@ -34,7 +34,7 @@ def observe_points(
     positions: NDArray[np.float64], views: RgbdViews, *, farthest: float
 ) -> Observations:
     """Points (n, 3) where the photographs' depth maps have them, up to ``farthest`` metres."""
-    points = np.arange(0, len(positions), max(len(positions) // MOST_POINTS, 1))
+    points = np.arange(0, len(positions), max(len(positions) // _MOST_POINTS, 1))
     _, height, width = views.depth.shape
     found = []
     for number, picture in enumerate(views.photographs):

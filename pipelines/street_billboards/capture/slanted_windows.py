@@ -18,7 +18,7 @@ RUN = 64
 """Pixels of a row whose windows are summed together."""
 
 
-def fit_planes(disparity: Map, side: int, near: float) -> tuple[Map, Map, Map]:
+def fit_disparity_planes(disparity: Map, side: int, near: float) -> tuple[Map, Map, Map]:
     """Value and slopes across and down of the plane through each pixel's surface.
 
     Of the window, what is within a pixel of its middle, then within ``near`` pixels of that plane.

@@ -66,12 +66,12 @@ class _Inverse(NamedTuple):
 
 
 def match_rectified_pair(
-    left: Photograph, right: Photograph, most: int, *, fine: bool = True
+    left: Photograph, right: Photograph, largest_disparity: int, *, fine: bool = True
 ) -> tuple[DisparityMap, DisparityMap]:
     """Disparities of the left and of the right photograph of a rectified pair.
 
-    left, right: (h, w, 3) sRGB, whose exposures may differ; most: the largest disparity looked for,
-    pixels. What only one of the two sees has none: ``fill_disparity_holes`` makes one up. fine:
+    left, right: (h, w, 3) sRGB, whose exposures may differ; largest_disparity: pixels, what is
+    looked for. What only one of the two sees has none: ``fill_disparity_holes`` makes one up. fine:
     match at twice the width. Thin things stay, fractions of a pixel are better, and it takes three
     times as long. Raises ValueError for photographs of different sizes.
     """
@@ -80,7 +80,7 @@ def match_rectified_pair(
             f"photographs: found {left.shape}, {right.shape}; expected (h, w, 3) both."
         )
     greys = _greys(left, right)
-    found = _both_sides(*greys, most, fine)
+    found = _both_sides(*greys, largest_disparity, fine)
     ways = ((left, 0, -1), (right, 1, 1))
     answer = []
     for one, (photograph, side, sign) in zip(found, ways, strict=True):
@@ -93,10 +93,10 @@ def match_rectified_pair(
     return answer[0], answer[1]
 
 
-def opencv_disparities(left: Photograph, right: Photograph, most: int) -> Map:
+def opencv_disparities(left: Photograph, right: Photograph, largest_disparity: int) -> Map:
     """Disparities (h, w) of the left photograph by OpenCV with its default parameters."""
     matcher = cv2.StereoSGBM.create()
-    matcher.setNumDisparities(_rounded(most))
+    matcher.setNumDisparities(_rounded(largest_disparity))
     found = matcher.compute(np.ascontiguousarray(left), np.ascontiguousarray(right))
     return _pixels(found, 1)
 

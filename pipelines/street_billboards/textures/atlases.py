@@ -127,15 +127,15 @@ def pack_slots(ranks: NDArray[np.integer]) -> NDArray[np.int64]:
 
 
 def pack_pages(
-    textures: CompressedTextures, most: int = MOST_TEXELS, *, byte_budget: int | None = None
+    textures: CompressedTextures, most_texels: int = MOST_TEXELS, *, byte_budget: int | None = None
 ) -> list[Page]:
     """Pack compressed textures into pages, in the order of the billboards.
 
-    most: texels of a texture's side that must not be exceeded. Raises ValueError where
+    most_texels: texels of a texture's side that must not be exceeded. Raises ValueError where
     ``byte_budget`` would be exceeded, a billboard does not fit on a page, channels 1 and 2 have
     planes of different sides, or a billboard has a direction twice.
     """
-    plans = _plans(textures, most)
+    plans = _plans(textures, most_texels)
     _check_budget(sum(_allocated(textures, plan) for plan in plans), byte_budget)
     return [_packed(textures, plan) for plan in plans]
 

@@ -222,7 +222,9 @@ def _decode_many(
 
 
 @njit(cache=True, nogil=True)
-def seen_errors(data: Decodable, views: ViewTextures, total: NDArray[np.float64]) -> None:
+def squared_errors_of_seen(
+    data: Decodable, views: ViewTextures, total: NDArray[np.float64]
+) -> None:
     """Sums of squares of errors of rounded colours of SEEN texels, into ``total`` (b,).
 
     Views are found by their direction.

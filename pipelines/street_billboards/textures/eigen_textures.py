@@ -1,8 +1,8 @@
 """Billboards' views compressed as eigen-textures (4.2, Eq. 1), and the paper's own form of them.
 
 `compress_views` spends bytes where they take off most error: luma in full and chroma in half
-resolution, for each billboard and channel as many planes as pay. One exchange rate of squared error
-for bytes holds for all of them (a Lagrange multiplier), searched until the error asked for is met.
+resolution, for each billboard and channel as many planes as pay. One Lagrange multiplier, squared
+error for bytes, holds for all of them, searched until the error asked for is met.
 
 `compress_views_as_paper` is what section 4.2 says: R, G and B, 32 directions, r planes each.
 """
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.textures.coded_arrays import CodedArrays, as_textures, grey_arrays
-from pipelines.street_billboards.textures.decoding import decodable, seen_errors
+from pipelines.street_billboards.textures.decoding import decodable, squared_errors_of_seen
 from pipelines.street_billboards.textures.eigen_kernels import (
     LUMA_CHROMA_WEIGHTS,
     ViewsToFit,
@@ -29,11 +29,11 @@ from pipelines.street_billboards.textures.eigen_kernels import (
 from pipelines.street_billboards.textures.low_rank_fit import RIDGE
 from pipelines.street_billboards.textures.masks import opacity_masks
 from pipelines.street_billboards.textures.paper_form import (
-    code_paper,
+    code_paper_form,
     masks_of_directions,
     nearest_views,
-    paper_squares,
     ranks_for_contribution,
+    squared_singular_values,
 )
 from pipelines.street_billboards.textures.rank_allocation import allocate_ranks
 from pipelines.street_billboards.textures.texture_tables import (
@@ -143,19 +143,18 @@ def compress_views_as_paper(
         raise ValueError(f"contribution is {contribution}; expected more than 0, 1 at most.")
     count = len(turns)
     nearest = nearest_views(views)
-    shares = np.bincount(nearest[nearest >= 0], minlength=len(views.direction))
-    data = (views.first, views.colours, views.states, shares.astype(np.float32))
+    shares = np.bincount(nearest[nearest >= 0], minlength=len(views.direction)).astype(np.float32)
     if contribution is None:
         ranks = np.full((count, 3), rank, np.uint8)
     else:
         squares = np.zeros((count, 3, DIRECTIONS))
-        paper_squares(data[0], data[1], data[2], data[3], squares)
+        squared_singular_values(views, shares, squares)
         ranks = ranks_for_contribution(squares, contribution)
         if rank is not None:
             ranks = np.minimum(ranks, np.uint8(rank))
     sides = np.full(3, SIDE)
     arrays = grey_arrays(ranks, np.full(count, DIRECTIONS), sides)
-    code_paper(data[0], data[1], data[2], data[3], nearest, arrays)
+    code_paper_form(views, shares, nearest, arrays)
     first_mask, masks = masks_of_directions(views, turns, nearest)
     return as_textures(
         arrays,
@@ -292,5 +291,5 @@ def decode_error(views: ViewTextures, textures: CompressedTextures) -> tuple[flo
 def _squared_errors(views: ViewTextures, textures: CompressedTextures) -> NDArray[np.float64]:
     """(b,) sums over SEEN texels and R, G, B."""
     total = np.zeros(len(views.first) - 1)
-    seen_errors(decodable(textures), views, total)
+    squared_errors_of_seen(decodable(textures), views, total)
     return total

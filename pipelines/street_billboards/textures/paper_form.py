@@ -31,9 +31,6 @@ from pipelines.street_billboards.textures.plane_resolution import fill_unknown
 from pipelines.street_billboards.textures.texture_tables import SIDE, ViewTextures
 from pipelines.street_billboards.textures.view_directions import DIRECTIONS
 
-Bytes = NDArray[np.uint8]
-Ints = NDArray[np.int64]
-
 _SWEEPS = 10
 
 
@@ -88,57 +85,49 @@ def _components(
 
 
 @njit(cache=True, nogil=True)
-def paper_squares(
-    first: Ints,
-    colours: Bytes,
-    states: Bytes,
-    shares: FloatArray,
-    squares: NDArray[np.float64],
+def squared_singular_values(
+    views: ViewTextures, shares: FloatArray, squares: NDArray[np.float64]
 ) -> None:
-    """Squared singular values into ``squares`` (b, 3, 32); shares (v,): directions of each view."""
+    """Of R, G and B, into ``squares`` (b, 3, 32), falling; shares (v,): directions of each view."""
     for b in range(len(squares)):
-        begin, end = first[b], first[b + 1]
-        counted = texel_weights(states[begin:end], np.ones(end - begin, np.float32))
+        begin, end = views.first[b], views.first[b + 1]
+        counted = texel_weights(views.states[begin:end], np.ones(end - begin, np.float32))
         if not (counted > 0.0).any():
             continue
-        channels = colour_channels(colours[begin:end], False)
+        channels = colour_channels(views.colours[begin:end], False)
         for c in range(3):
             squares[b, c, : end - begin] = _components(channels[c], counted, shares[begin:end])[2]
 
 
 @njit(cache=True, nogil=True)
-def code_paper(
-    first: Ints,
-    colours: Bytes,
-    states: Bytes,
-    shares: FloatArray,
-    nearest: Ints,
-    arrays: CodedArrays,
+def code_paper_form(
+    views: ViewTextures, shares: FloatArray, nearest: NDArray[np.int64], arrays: CodedArrays
 ) -> None:
     """Codes of 32 views a billboard into ``arrays``, of the ranks that they have.
 
-    nearest (b, 32): rows of observed views. Planes beyond the rank that exists stay as they are.
+    shares (v,): directions of each view; nearest (b, 32): rows of observed views. Planes beyond the
+    rank that exists stay as they are.
     """
     for b in range(len(nearest)):
-        begin, end = first[b], first[b + 1]
-        views = end - begin
-        counted = texel_weights(states[begin:end], np.ones(views, np.float32))
+        begin, end = views.first[b], views.first[b + 1]
+        count = end - begin
+        counted = texel_weights(views.states[begin:end], np.ones(count, np.float32))
         if not (counted > 0.0).any():
             continue
-        channels = colour_channels(colours[begin:end], False)
-        everything = np.ones((views, SIDE * SIDE), np.float32)
+        channels = colour_channels(views.colours[begin:end], False)
+        everything = np.ones((count, SIDE * SIDE), np.float32)
         for c in range(3):
             rank = int(arrays.ranks[b, c])
             filled, factors, squares = _components(channels[c], counted, shares[begin:end])
             kept = 0
-            while kept < min(rank, views) and squares[kept] > 0.0:
+            while kept < min(rank, count) and squares[kept] > 0.0:
                 kept += 1
             plane, weight = arrays.first_plane[c][b], arrays.first_weight[c][b]
             codes = ChannelCodes(
-                np.empty(views, np.uint8),
+                np.empty(count, np.uint8),
                 arrays.planes[c][plane : plane + kept],
                 arrays.scales[c][plane : plane + kept],
-                np.empty(views * kept, np.uint8),
+                np.empty(count * kept, np.uint8),
             )
             largest = Factors(
                 factors.means, factors.weights[:, :kept].copy(), factors.images[:kept].copy()

@@ -1,7 +1,7 @@
 """How many planes each billboard gets for the fewest bytes.
 
-A plane is worth its bytes where it takes off more squared error than they would elsewhere: with one
-exchange rate for all billboards (a Lagrange multiplier) each chooses for itself.
+Rate against distortion: a plane is worth its bytes where it takes off more squared error than they
+would elsewhere. With one Lagrange multiplier for all billboards each chooses for itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _LEAST, _MOST = -20.0, 40.0
-"""Octaves of the exchange rate, codes² a byte."""
+"""Octaves of the multiplier, codes² a byte."""
 _BISECTIONS = 50
 
 
@@ -31,7 +31,7 @@ def allocate_ranks(squares: Floats, costs: Floats, allowed: float) -> RankAlloca
     """The fewest bytes that leave ``allowed`` at most, or as little as can be.
 
     squares, costs (b, 3, ranks): sums of squares that ranks leave (infinity where there is no such
-    rank), and their bytes. The exchange rate is found by bisection: the result does not depend on
+    rank), and their bytes. The multiplier is found by bisection: the result does not depend on
     the order of billboards.
 
     >>> left = np.array([[[90.0, 30.0, 20.0]] * 3, [[50.0, 45.0, 44.0]] * 3])
@@ -40,8 +40,8 @@ def allocate_ranks(squares: Floats, costs: Floats, allowed: float) -> RankAlloca
     ([[1, 1, 1], [0, 0, 0]], 240.0)
     """
 
-    def at(rate: float) -> RankAllocation:
-        ranks = (squares + rate * costs).argmin(axis=2)
+    def at(multiplier: float) -> RankAllocation:
+        ranks = (squares + multiplier * costs).argmin(axis=2)
         left = np.take_along_axis(squares, ranks[:, :, None], 2).sum()
         return RankAllocation(ranks.astype(np.uint8), float(left))
 

@@ -18,7 +18,7 @@ from pipelines.street_billboards.textures.photographs import Photographs, best_p
 from pipelines.street_billboards.textures.texel_sampling import SampledViews, sample_views
 from pipelines.street_billboards.textures.texture_tables import SEEN, SIDE, ViewTextures
 
-TRIED = 4
+_TRIED = 4
 """Photographs that are asked for one view."""
 _LEAST_TEXELS = 12
 """That a view must show."""
@@ -42,7 +42,7 @@ def view_textures(
     photograph a view, squares of the voxel's side opaque all over, as in the paper.
     """
     first, direction, chosen = _views(
-        best_photographs(billboards, photographs, 1 if plain else TRIED, farthest)
+        best_photographs(billboards, photographs, 1 if plain else _TRIED, farthest)
     )
     count = len(direction)
     sampled = SampledViews(
