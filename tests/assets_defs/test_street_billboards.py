@@ -340,7 +340,7 @@ REGRESSIONS = (
     Regression("exposure_spread", drive_photographs, "expose_photograph", _bright_camera, KEYS),
     Regression("detail", drive_photographs, "expose_photograph", _blurred, KEYS),
     Regression("frame_spacing", city_drive, "plan_drive", _slower, KEYS),
-    Regression("stereo_bad05", stereo, "refined", _off_by_a_pixel, KEYS),
+    Regression("stereo_bad05", stereo, "refine_disparities", _off_by_a_pixel, KEYS),
     Regression("depth_error", stereo, "depth_maps", _deeper, KEYS),
     Regression("known_share", stereo, "depth_maps", _half_unknown, KEYS),
     Regression(
