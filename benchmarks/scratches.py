@@ -12,12 +12,10 @@ from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches.drawing.frames import cameras
 from pipelines.glass_scratches.drawing.path_tracing import Strategy, Surface, make_surface, trace
 from pipelines.glass_scratches.figures import block_means
-from pipelines.glass_scratches.layers.scratch_layers import (
-    LayerSpec,
-    coverage_maps,
-    layer_arrays,
-    make_layers,
-)
+from pipelines.glass_scratches.layers.coverage import coverage_maps
+from pipelines.glass_scratches.layers.features import layer_arrays
+from pipelines.glass_scratches.layers.scratch_layers import make_layers
+from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables.bins import bin_weights
 from pipelines.glass_scratches.tables.exact import exchange, leaving_share, solve
 from pipelines.glass_scratches.tables.monte_carlo import shoot

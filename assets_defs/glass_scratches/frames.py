@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -12,7 +12,7 @@ from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import ENVIRONMENTS, SCRATCHES
 from assets_defs.settings import Preset, Settings, UserFile
 from assets_defs.sources import Source
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Progress, Result
 from storage.schemas import glass_scratches as schemas
 from storage.stored_version import StoredVersion
 
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
+    from pipelines.geometry.solids import Solid
 
 _ENVIRONMENT_HEIGHT = 512
 
@@ -47,18 +46,14 @@ class ObjectSettings(Settings):
     }
 
 
-def _edge_error(checked: StoredVersion) -> float:
-    """Share of the edges without exactly two triangles of opposite senses."""
-    import numpy as np
+def _edge_error(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import edge_error
 
-    triangles = checked.dataset["triangles"].values.astype(np.int64)
-    count = int(triangles.max()) + 1
-    one, other = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    return float(1 - np.isin(one * count + other, other * count + one).mean())
+    return edge_error(version.dataset["triangles"].values)
 
 
-def _volume(checked: StoredVersion) -> float:
-    return float(checked.dataset["volume"])
+def _volume(version: StoredVersion) -> float:
+    return float(version.dataset["volume"])
 
 
 @SCRATCHES.asset(
@@ -78,36 +73,33 @@ def _volume(checked: StoredVersion) -> float:
 )
 def glass_object(settings: ObjectSettings, source: Source) -> Result:
     """Make the plate or the teapot, or close-check, orient and scale a mesh."""
-    import numpy as np
-    import xarray as xr
-
-    from pipelines.geometry.meshes import y_up_to_z_up
+    from assets_defs.glass_scratches.datasets import solid_dataset
     from pipelines.geometry.solid_shapes import glass_teapot, plate
-    from pipelines.geometry.solids import make_solid
-    from storage.readers.meshes import read_mesh
 
     if source.path is not None:
-        vertices, triangles, _ = read_mesh(source.path)
-        if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
-            vertices = y_up_to_z_up(vertices)
-        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        vertices /= np.linalg.norm(vertices, axis=1).max()
-        solid = make_solid(vertices, triangles)
+        solid = _solid_of_file(source.path, settings.up)
     elif source.key == "teapot":
         solid = glass_teapot(settings.segments, settings.thickness)
     else:
         solid = plate(1.5, 1.1, settings.thickness)
-    a, b, c = np.moveaxis(solid.vertices[solid.triangles], 1, 0)
-    dataset = xr.Dataset(
-        {
-            "vertices": (("vertex", "axis"), solid.vertices),
-            "triangles": (("triangle", "corner"), solid.triangles),
-            "corner_normals": (("triangle", "corner", "axis"), solid.corner_normals),
-            "volume": ((), float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)),
-        },
-        attrs={"name": source.name},
-    )
+    dataset = solid_dataset(solid, source.name)
     return dataset, {"vertices": len(solid.vertices), "triangles": len(solid.triangles)}
+
+
+def _solid_of_file(path: Path, up: str) -> Solid:
+    """A closed mesh around the origin, of radius 1."""
+    import numpy as np
+
+    from pipelines.geometry.meshes import y_up_to_z_up
+    from pipelines.geometry.solids import make_solid
+    from storage.readers.meshes import read_mesh
+
+    vertices, triangles, _ = read_mesh(path)
+    if up == "y" or (up == "auto" and path.suffix.lower() == ".glb"):
+        vertices = y_up_to_z_up(vertices)
+    vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    vertices /= np.linalg.norm(vertices, axis=1).max()
+    return make_solid(vertices, triangles)
 
 
 # ---- glass_frames ----------------------------------------------------------------------------
@@ -199,36 +191,35 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _not_finite(checked: StoredVersion) -> float:
-    import numpy as np
+def _not_finite(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import impossible_share
 
-    radiance = checked.dataset["radiance"].values
-    return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))
+    return impossible_share(version.dataset["radiance"].values)
 
 
-def _furnace_excess(checked: StoredVersion) -> float:
+def _furnace_excess(version: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import brightest_excess
 
-    dataset = checked.dataset
+    dataset = version.dataset
     return brightest_excess(dataset["furnace"].values, dataset["furnace_error"].values)
 
 
-def _furnace_loss(checked: StoredVersion) -> float:
-    return float(1 - checked.dataset["furnace"].values.mean())
+def _furnace_loss(version: StoredVersion) -> float:
+    return float(1 - version.dataset["furnace"].values.mean())
 
 
-def _mean_brightness(checked: StoredVersion) -> float:
-    return float(checked.dataset["frames"].values.mean() / 255.0)
+def _mean_brightness(version: StoredVersion) -> float:
+    return float(version.dataset["frames"].values.mean() / 255.0)
 
 
-def _stage_brightness(checked: StoredVersion) -> float:
+def _stage_brightness(version: StoredVersion) -> float:
     """Mean of the stage's pictures over that of the traced ones."""
-    dataset = checked.dataset
+    dataset = version.dataset
     return float(dataset["stage"].values.mean() / dataset["frames"].values.mean())
 
 
-def _scratched_share(checked: StoredVersion) -> float:
-    return float(checked.dataset["scratched"].values[1].mean())
+def _scratched_share(version: StoredVersion) -> float:
+    return float(version.dataset["scratched"].values[1].mean())
 
 
 @SCRATCHES.asset(
@@ -285,100 +276,29 @@ def _scratched_share(checked: StoredVersion) -> float:
 )
 def glass_frames(
     settings: FrameSettings,
-    progress: Callable[[float], None],
+    progress: Progress,
     scratch_table_2d: xr.Dataset,
     scratch_table: xr.Dataset,
     scratch_layers: xr.Dataset,
     glass_object: xr.Dataset,
 ) -> Result:
     """Trace the far and the close view, draw the same on the stage, and let the light go around."""
-    import numpy as np
-    import xarray as xr
-
-    from assets_defs.glass_scratches.layers import layers_of
-    from pipelines.drawing.colour import to_8bit
-    from pipelines.geometry.solids import Solid
-    from pipelines.glass_scratches.drawing.frames import (
-        exposure,
-        furnace,
-        moving_light,
-        trace_frames,
-    )
-    from pipelines.glass_scratches.drawing.path_tracing import make_surface
-    from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
-    from pipelines.glass_scratches.layers.scratch_layers import layer_arrays
-    from pipelines.glass_scratches.tables.sampling import lobe_of
-    from pipelines.glass_scratches.tables.scratch_table import Lean
+    from assets_defs.glass_scratches.datasets import frames_dataset, scratched_glass_of
+    from pipelines.glass_scratches.drawing.frames import draw_frames
     from pipelines.light.environment_sampling import make_environment_sampler
 
-    solid = Solid(
-        glass_object["vertices"].values,
-        glass_object["triangles"].values,
-        glass_object["corner_normals"].values,
-    )
-    index = float(scratch_table["index"])
-    coverage = scratch_layers["coverage"].values
-    lean = Lean(scratch_table["factor"].values, scratch_table["gamma"].values)
-    surface = make_surface(
-        layer_arrays(layers_of(scratch_layers)),
-        coverage,
-        lobe_of(
-            scratch_table_2d["across"].values,
-            scratch_table["cdf"].values,
-            scratch_table["share"].values,
-            scratch_table_2d.attrs["roughness"],
-        ),
-        lean,
-        roughness=scratch_table_2d.attrs["roughness"],
-        tile=settings.tile,
-        index=index,
-    )
-    actor = ScratchedActor(
-        solid,
-        coverage,
-        scratch_layers["angle"].values,
-        scratch_table_2d["rho"].values,
-        lean,
-        index=index,
-        tile=settings.tile,
-    )
-    light = make_environment_sampler(environment(settings))
-    views = trace_frames(
-        solid,
-        surface,
-        actor,
-        light,
+    tables = (scratch_table_2d, scratch_table)
+    glass = scratched_glass_of(*tables, scratch_layers, glass_object, settings.tile)
+    frames = draw_frames(
+        glass,
+        make_environment_sampler(environment(settings)),
         size=settings.size,
         samples=settings.samples,
+        lights=settings.lights,
+        moving_size=settings.moving_size,
         seed=settings.frame_seed,
-        progress=lambda fraction: progress(0.8 * fraction),
+        progress=progress,
     )
-    moving = moving_light(
-        solid,
-        actor,
-        light,
-        count=settings.lights,
-        size=settings.moving_size,
-        progress=lambda fraction: progress(0.8 + 0.15 * fraction),
-    )
-    white = furnace(solid, surface, settings.frame_seed)
-    traced = (views.far, views.close)
-    radiance = np.stack([picture.radiance for picture in traced])
-    scale = exposure(light)
-    pixels = ("view", "y", "x")
-    furnace_pixels = ("furnace_row", "furnace_column")
-    dataset = xr.Dataset(
-        {
-            "radiance": ((*pixels, "channel"), radiance),
-            "error": (pixels, np.sqrt(np.stack([picture.variance for picture in traced]))),
-            "scratched": (pixels, np.stack([picture.scratched for picture in traced])),
-            "frames": ((*pixels, "channel"), to_8bit(radiance * scale)),
-            "stage": ((*pixels, "channel"), to_8bit(views.stage * scale)),
-            "moving": (("light", "row", "column", "channel"), moving),
-            "exposure": ((), scale),
-            "furnace": (furnace_pixels, white.radiance.mean(axis=2)),
-            "furnace_error": (furnace_pixels, np.sqrt(white.variance)),
-        }
-    )
-    rays = sum(picture.rays for picture in traced)
-    return dataset, {"rays": rays, "noise, close": float(dataset["error"].values[1].mean())}
+    dataset = frames_dataset(frames)
+    noise = float(dataset["error"].values[1].mean())
+    return dataset, {"rays": frames.far.rays + frames.close.rays, "noise, close": noise}

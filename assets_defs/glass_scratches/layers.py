@@ -11,20 +11,14 @@ from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Result
 from storage.schemas import glass_scratches as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
 
-    from pipelines.glass_scratches.layers.scratch_layers import Layers
     from pipelines.glass_scratches.layers.settings import LayerSpec
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 _STAGE_SIZE = 256
 MAP_SAMPLES = 16
@@ -91,26 +85,6 @@ def layer_spec(settings: LayerSettings) -> LayerSpec:
     return LayerSpec(**chosen)
 
 
-def layers_of(dataset: xr.Dataset) -> Layers:
-    """The scratches of a `scratch_layers` dataset, with their search grid."""
-    from pipelines.glass_scratches.layers.scratch_layers import join_features
-
-    return join_features(
-        dataset["angle"].values,
-        dataset["feature_layer"].values,
-        dataset["centre"].values,
-        dataset["turn"].values,
-        dataset["half_length"].values,
-        dataset["half_width"].values,
-        dataset["curvature"].values,
-        dataset["strength"].values,
-        dataset["seed"].values,
-        dataset["is_dig"].values,
-        fading=dataset.attrs["fading"],
-        breaks=dataset.attrs["breaks"],
-    )
-
-
 def _layer_pictures(dataset: xr.Dataset) -> Pictures:
     import numpy as np
 
@@ -123,29 +97,19 @@ def _layer_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
-def _coverage_error(checked: StoredVersion) -> float | None:
-    """Against what was asked for, or for a threshold against what Poisson points give."""
-    import numpy as np
+def _coverage_error(version: StoredVersion) -> float | None:
+    from pipelines.glass_scratches.figures import coverage_error
 
-    settings = checked.record["settings"]
-    found = checked.dataset["coverage"].values.mean(axis=(1, 2), dtype=np.float64)
-    wanted = settings["coverage"]
-    if wanted is None:
-        plain = all(settings[name] == 0 for name in ("digs", "fading", "breaks", "spread"))
-        if not plain:
-            return None
-        wanted = 1 - np.exp(-np.pi * settings["threshold"] ** 2)
-    return float(np.abs(found / wanted - 1).mean())
+    settings = LayerSettings(**version.record["settings"])
+    return coverage_error(version.dataset["coverage"].values, layer_spec(settings))
 
 
-def _map_z(checked: StoredVersion) -> float:
-    """RMS z-score of the maps' means over 8 x 8 blocks against the scratches sampled anew."""
-    from pipelines.glass_scratches.figures import block_z_rms
-    from pipelines.glass_scratches.layers.scratch_layers import coverage_maps
+def _map_z(version: StoredVersion) -> float:
+    from assets_defs.glass_scratches.datasets import layers_of
+    from pipelines.glass_scratches.figures import coverage_map_z
 
-    maps = checked.dataset["coverage"].values
-    again = coverage_maps(layers_of(checked.dataset), maps.shape[1] // 2, 4 * MAP_SAMPLES)
-    return block_z_rms(maps, again, samples=MAP_SAMPLES * maps[0].size)
+    dataset = version.dataset
+    return coverage_map_z(dataset["coverage"].values, layers_of(dataset), MAP_SAMPLES)
 
 
 @SCRATCHES.asset(
@@ -171,35 +135,17 @@ def _map_z(checked: StoredVersion) -> float:
 )
 def scratch_layers(settings: LayerSettings) -> Result:
     """Scatter the scratches and map their coverage."""
-    import xarray as xr
-
+    from assets_defs.glass_scratches.datasets import layers_dataset
     from pipelines.glass_scratches.layers.pictures import stages
-    from pipelines.glass_scratches.layers.scratch_layers import coverage_maps, make_layers
+    from pipelines.glass_scratches.layers.coverage import coverage_maps
+    from pipelines.glass_scratches.layers.scratch_layers import make_layers
 
     spec = layer_spec(settings)
-    made = make_layers(spec, settings.layer_seed)
-    maps = coverage_maps(made, settings.resolution, MAP_SAMPLES)
-    feature = "feature"
-    variables = {
-        "angle": ("layer", made.angle),
-        "feature_layer": (feature, made.layer),
-        "centre": ((feature, "axis"), made.centre),
-        "turn": (feature, made.turn),
-        "half_length": (feature, made.half_length),
-        "half_width": (feature, made.half_width),
-        "curvature": (feature, made.curvature),
-        "strength": (feature, made.strength),
-        "seed": (feature, made.seed),
-        "is_dig": (feature, made.is_dig),
-        "coverage": (("layer", "y", "x"), maps),
-        "stages": (("stage", "row", "column"), stages(spec, settings.layer_seed, _STAGE_SIZE)),
-    }
-    features = sum(
-        array.nbytes for name, (_, array) in variables.items() if name not in ("coverage", "stages")
-    )
-    dataset = xr.Dataset(variables, attrs={"fading": spec.fading, "breaks": spec.breaks})
+    layers = make_layers(spec, settings.layer_seed)
+    maps = coverage_maps(layers, settings.resolution, MAP_SAMPLES)
+    dataset = layers_dataset(layers, maps, stages(spec, settings.layer_seed, _STAGE_SIZE))
     return dataset, {
-        "scratches": len(made.layer),
-        "bytes of the scratches": features,
+        "scratches": len(layers.features.layer),
+        "bytes of the scratches": layers.angle.nbytes + sum(f.nbytes for f in layers.features),
         "coverage of a layer, mean": float(maps.mean()),
     }

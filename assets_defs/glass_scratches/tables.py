@@ -12,17 +12,12 @@ from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Metadata
+from assets_defs.system import Pictures, Result
 from storage.schemas import glass_scratches as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
-
-    Pictures = dict[str, NDArray[np.uint8]]
-    Result = tuple[xr.Dataset, Metadata]
 
 
 # ---- scratch_profile -------------------------------------------------------------------------
@@ -53,14 +48,16 @@ def _profile_pictures(dataset: xr.Dataset) -> Pictures:
     return {"profile": profile_picture(dataset["points"].values)}
 
 
-def _aspect(checked: StoredVersion) -> float:
-    points = checked.dataset["points"].values
-    return float(-points[:, 1].min() / (points[-1, 0] - points[0, 0]))
+def _aspect(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import profile_aspect
+
+    return profile_aspect(version.dataset["points"].values)
 
 
-def _opening_tilt(checked: StoredVersion) -> float:
-    points = checked.dataset["points"].values
-    return float(abs(points[[0, -1], 1]).max() + max(points[:, 1].max(), 0.0))
+def _opening_tilt(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import opening_tilt
+
+    return opening_tilt(version.dataset["points"].values)
 
 
 @SCRATCHES.asset(
@@ -147,40 +144,37 @@ def _table_pictures(dataset: xr.Dataset) -> Pictures:
     return {"table": table_picture(dataset["rho"].values)}
 
 
-def _furnace_error(checked: StoredVersion) -> float:
-    from pipelines.glass_scratches.tables.exact import leaving_share
+def _furnace_error(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import table_furnace_error
 
-    dataset = checked.dataset
-    leaving = leaving_share(dataset["rho"].values)
-    return float(abs(leaving + dataset["absorbed"].values - 1).max())
+    return table_furnace_error(version.dataset["rho"].values, version.dataset["absorbed"].values)
 
 
-def _reciprocity_error(checked: StoredVersion) -> float:
+def _reciprocity_error(version: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import reciprocity_error
 
     return reciprocity_error(
-        checked.dataset["rho"].values, checked.dataset["standard_error"].values
+        version.dataset["rho"].values, version.dataset["standard_error"].values
     )
 
 
-def _paths_z(checked: StoredVersion) -> float:
+def _paths_z(version: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import paths_z_rms
 
-    settings = checked.record["settings"]
+    settings = version.record["settings"]
     return paths_z_rms(
-        checked.input("scratch_profile")["points"].values,
-        checked.dataset["rho"].values,
-        checked.dataset["standard_error"].values,
+        version.input("scratch_profile")["points"].values,
+        version.dataset["rho"].values,
+        version.dataset["standard_error"].values,
         albedo=settings["albedo"],
         roughness=settings["roughness"],
     )
 
 
-def _across_error(checked: StoredVersion) -> float:
-    dataset = checked.dataset
-    mean = dataset["across"].values.mean(axis=0, dtype="float64")
-    rho = dataset["rho"].values
-    return float(abs(mean - rho.T).max() / rho.max())
+def _across_error(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import across_error
+
+    return across_error(version.dataset["across"].values, version.dataset["rho"].values)
 
 
 @SCRATCHES.asset(
@@ -218,8 +212,7 @@ def _across_error(checked: StoredVersion) -> float:
 )
 def scratch_table_2d(settings: TableSettings, scratch_profile: xr.Dataset) -> Result:
     """Solve for the table, or shoot paths."""
-    import xarray as xr
-
+    from assets_defs.glass_scratches.datasets import table_2d_dataset
     from pipelines.glass_scratches.tables.exact import leaving_share
     from pipelines.glass_scratches.tables.scratch_table import scratch_table as make_table
 
@@ -235,15 +228,7 @@ def scratch_table_2d(settings: TableSettings, scratch_profile: xr.Dataset) -> Re
         paths_per_ray=settings.paths_per_ray,
         seed=settings.table_seed,
     )
-    dataset = xr.Dataset(
-        {
-            "rho": (("out", "in"), table.rho),
-            "standard_error": (("out", "in"), table.standard_error),
-            "absorbed": ("in", table.absorbed),
-            "across": (("place", "out", "in"), table.across),
-        },
-        attrs={"method": method, "roughness": settings.roughness},
-    )
+    dataset = table_2d_dataset(table, method, settings.roughness)
     return dataset, {"method": method, "least leaving": float(leaving_share(table.rho).min())}
 
 
@@ -268,31 +253,23 @@ def _spatial_pictures(dataset: xr.Dataset) -> Pictures:
     return {"leans": lean_picture(dataset["factor"].values, dataset["gamma"].values)}
 
 
-def _sampler_p(checked: StoredVersion) -> float:
+def _sampler_p(version: StoredVersion) -> float:
+    from assets_defs.glass_scratches.datasets import lobe_of
     from pipelines.glass_scratches.figures import sampler_p_value
-    from pipelines.glass_scratches.tables.sampling import lobe_of
 
-    dataset, plane = checked.dataset, checked.input("scratch_table_2d")
-    return sampler_p_value(
-        lobe_of(
-            plane["across"].values,
-            dataset["cdf"].values,
-            dataset["share"].values,
-            plane.attrs["roughness"],
-        )
-    )
+    return sampler_p_value(lobe_of(version.input("scratch_table_2d"), version.dataset))
 
 
-def _interpolation_error(checked: StoredVersion) -> float:
+def _interpolation_error(version: StoredVersion) -> float:
     from pipelines.glass_scratches.tables.scratch_table import interpolation_error
 
-    settings = checked.record["settings"]
-    bins = checked.dataset.sizes["out"]
+    settings = version.record["settings"]
+    bins = version.dataset.sizes["out"]
     return interpolation_error(bins, settings["refractive_index"], settings["fresnel"])["mean"]
 
 
-def _largest_share(checked: StoredVersion) -> float:
-    dataset = checked.dataset
+def _largest_share(version: StoredVersion) -> float:
+    dataset = version.dataset
     return float(dataset["share"].mean(dim="place").max())
 
 
@@ -327,27 +304,12 @@ def _largest_share(checked: StoredVersion) -> float:
 )
 def scratch_table(settings: LeanSettings, scratch_table_2d: xr.Dataset) -> Result:
     """Add the lean along the scratch, and what sampling needs."""
-    import numpy as np
-    import xarray as xr
-
+    from assets_defs.glass_scratches.datasets import table_dataset
     from pipelines.glass_scratches.tables.sampling import make_lobe
-    from pipelines.glass_scratches.tables.scratch_table import LEANS, lean_factors
+    from pipelines.glass_scratches.tables.scratch_table import lean_factors
 
     rho = scratch_table_2d["rho"].values
     lean = lean_factors(len(rho), settings.refractive_index, settings.fresnel)
     lobe = make_lobe(scratch_table_2d["across"].values, scratch_table_2d.attrs["roughness"])
-    dataset = xr.Dataset(
-        {
-            "rho_s": (
-                ("lean", "out", "in"),
-                (lean.factor[:, :, None] * rho).astype(np.float32),
-            ),
-            "lean": ("lean", np.array(LEANS)),
-            "factor": (("lean", "out"), lean.factor),
-            "gamma": ("out", lean.gamma),
-            "cdf": (("place", "out", "border"), lobe.cdf),
-            "share": (("place", "out"), lobe.share),
-            "index": ((), settings.refractive_index),
-        }
-    )
+    dataset = table_dataset(rho, lean, lobe, settings.refractive_index)
     return dataset, {"gamma, straight on": float(lean.gamma[len(rho) // 2])}

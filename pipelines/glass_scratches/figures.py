@@ -6,10 +6,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.glass_scratches.layers.coverage import coverage_maps
+from pipelines.glass_scratches.layers.features import Layers
+from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.exact import leaving_share
 from pipelines.glass_scratches.tables.monte_carlo import shoot
-from pipelines.glass_scratches.tables.sampling import Lobe
+from pipelines.glass_scratches.tables.sampling import Direction, Lobe
 
 BLOCKS = 16
 _INCIDENCES, _PATHS = 16, 20_000
@@ -92,12 +96,12 @@ def sampler_p_value(lobe: Lobe, samples: int = 40_000) -> float:
     columns, rows = min(16, lobe.rho.shape[1] // 2), 12
     least, tested = 1.0, 0
     for number, (lean, angle) in enumerate(views):
-        o = np.array([np.sin(lean), np.cos(lean) * np.sin(angle), np.cos(lean) * np.cos(angle)])
+        view = Direction(np.sin(lean), np.cos(lean) * np.sin(angle), np.cos(lean) * np.cos(angle))
         for place in (1, len(lobe.rho) // 2):
             u = np.random.default_rng(number).random((samples, 3))
             found = np.zeros((rows, columns))
-            _count(lobe, place, o, u, found)
-            expected = samples * _expected(lobe, place, o, rows, columns)
+            _count(lobe, place, view, u, found)
+            expected = samples * _expected(lobe, place, view, rows, columns)
             order = np.argsort(expected.ravel())
             # Cells with few expected are joined until there are enough in each.
             groups = np.cumsum(expected.ravel()[order]) // 8
@@ -141,19 +145,87 @@ def brightest_excess(
     return float(((mean - 1) / np.maximum(np.sqrt(variance) / block**2, 1e-3)).max())
 
 
+def profile_aspect(points: NDArray[np.float64]) -> float:
+    """Depth of a profile (n, 2) of v, n over its opening's width.
+
+    >>> profile_aspect(np.array([[0.0, 0.0], [5.0, -4.0], [10.0, 0.0]]))
+    0.4
+    """
+    return float(-points[:, 1].min() / (points[-1, 0] - points[0, 0]))
+
+
+def opening_tilt(points: NDArray[np.float64]) -> float:
+    """How far a profile's ends, or anything between, lie off n = 0, in its units."""
+    return float(abs(points[[0, -1], 1]).max() + max(points[:, 1].max(), 0.0))
+
+
+def table_furnace_error(rho: NDArray[np.float64], absorbed: NDArray[np.float64]) -> float:
+    """Largest part of a beam that neither leaves nor stays: table (M, M), absorbed (M,)."""
+    return float(abs(leaving_share(rho) + absorbed - 1).max())
+
+
+def across_error(across: NDArray[np.float32], rho: NDArray[np.float64]) -> float:
+    """Largest difference of the mean of tables across the opening (places, M, M) from the table
+    (M, M), over its largest value."""
+    mean = across.mean(axis=0, dtype="float64")
+    return float(abs(mean - rho.T).max() / rho.max())
+
+
+def coverage_error(maps: NDArray[np.float32], spec: LayerSpec) -> float | None:
+    """Relative difference of maps' (L, R, R) coverage from what was asked for, mean of layers.
+
+    For a threshold, from what Poisson points give; None where that has no closed form.
+    """
+    found = maps.mean(axis=(1, 2), dtype=np.float64)
+    wanted = spec.coverage
+    if wanted is None:
+        if any((spec.digs, spec.fading, spec.breaks, spec.spread)):
+            return None
+        wanted = 1 - np.exp(-np.pi * spec.threshold**2)
+    return float(np.abs(found / wanted - 1).mean())
+
+
+def coverage_map_z(maps: NDArray[np.float32], layers: Layers, samples: int) -> float:
+    """RMS z-score of the means of maps (L, R, R), of ``samples`` a texel, over 8 x 8 blocks against
+    the scratches sampled anew."""
+    again = coverage_maps(layers, maps.shape[1] // 2, 4 * samples)
+    return block_z_rms(maps, again, samples=samples * maps[0].size)
+
+
+def edge_error(triangles: NDArray[np.integer]) -> float:
+    """Share of the sides of triangles (F, 3) without a partner of the opposite sense.
+
+    >>> edge_error(np.array([[0, 1, 2], [0, 2, 1]])), edge_error(np.array([[0, 1, 2]]))
+    (0.0, 1.0)
+    """
+    corners = np.asarray(triangles, np.int64)
+    count = int(corners.max()) + 1
+    one, other = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    return float(1 - np.isin(one * count + other, other * count + one).mean())
+
+
+def enclosed_volume(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> float:
+    """Volume inside a closed surface (V, 3), (F, 3), by the divergence theorem."""
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def impossible_share(radiance: NDArray[np.floating]) -> float:
+    """Share of the radiance that is not finite, or negative."""
+    return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))
+
+
 @njit(cache=True)
-def _count(lobe, place, o, u, found):  # type: ignore[no-untyped-def]
+def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
     rows, columns = found.shape
     for i in range(len(u)):
-        a, v, n = sampling.sample(
-            lobe.cdf, lobe.sines, lobe.blur, place, o[0], o[1], o[2], u[i, 0], u[i, 1], u[i, 2]
-        )
+        a, v, n = sampling.sample(lobe, place, view, u[i, 0], u[i, 1], u[i, 2])
         row = min(int(sampling.quantile(a) * rows), rows - 1)
         found[row, sampling.bin_of(v, n, columns)] += 1.0
 
 
 @njit(cache=True)
-def _expected(lobe, place, o, rows, columns):  # type: ignore[no-untyped-def]
+def _expected(lobe, place, view, rows, columns):  # type: ignore[no-untyped-def]
     """Integral of the density over cells of equal quantile and equal phi, by the midpoints of
     narrow strips: the measure of a direction is dphi cos theta dtheta."""
     part = np.zeros((rows, columns))
@@ -170,10 +242,8 @@ def _expected(lobe, place, o, rows, columns):  # type: ignore[no-untyped-def]
                     sine = low + (step + 0.5) / steps * (high - low)
                     cosine = np.sqrt(max(1.0 - sine * sine, 1e-18))
                     rest = np.sqrt(rest2)
-                    density = sampling.pdf(
-                        lobe.rho, lobe.share, lobe.blur, place, o[0], o[1], o[2],
-                        along, rest * sine, rest * cosine,
-                    )  # fmt: skip
+                    light = Direction(along, rest * sine, rest * cosine)
+                    density = sampling.pdf(lobe, place, view, light)
                     size = (high - low) / steps / cosine * np.pi / (2.0 * rest * rows * fine)
                     part[row, column * columns // bins] += density * size
     return part

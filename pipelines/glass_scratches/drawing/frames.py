@@ -26,12 +26,60 @@ _CLOSE_AZIMUTH, _CLOSE_ELEVATION = -82.0, 8.0
 FURNACE_SIZE, FURNACE_SAMPLES = 48, 64
 
 
-class Frames(NamedTuple):
-    """``far`` and ``close`` as traced; ``stage`` (2, H, W, 3) float32: the same on the stage."""
+class ScratchedGlass(NamedTuple):
+    """One scratched solid: its shape, its surface to be traced, and itself on the stage."""
+
+    solid: Solid
+    surface: Surface
+    actor: ScratchedActor
+
+
+class GlassFrames(NamedTuple):
+    """What scratched glass looks like.
+
+    far, close: as traced. stage: (2, H, W, 3) float32 radiance, the same views on the stage.
+    moving: (lights, S, S, 3) uint8, the close view while the light turns once around.
+    furnace: the far view in an environment of radiance 1. exposure: factor for display.
+    """
 
     far: Picture
     close: Picture
     stage: NDArray[np.float32]
+    moving: NDArray[np.uint8]
+    furnace: Picture
+    exposure: float
+
+
+def draw_frames(
+    glass: ScratchedGlass,
+    light: EnvironmentSampler,
+    *,
+    size: int,
+    samples: int,
+    lights: int,
+    moving_size: int,
+    seed: int,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> GlassFrames:
+    """Trace both views (size x size pixels, ``samples`` paths each), draw the same on the stage,
+    let the light go around in ``lights`` pictures, and trace the furnace."""
+    (far, close), stage = trace_views(
+        glass,
+        light,
+        size=size,
+        samples=samples,
+        seed=seed,
+        progress=lambda fraction: progress(0.8 * fraction),
+    )
+    moving = moving_light(
+        glass,
+        light,
+        count=lights,
+        size=moving_size,
+        progress=lambda fraction: progress(0.8 + 0.15 * fraction),
+    )
+    white = furnace(glass.solid, glass.surface, seed)
+    return GlassFrames(far, close, stage, moving, white, exposure(light))
 
 
 def cameras(solid: Solid) -> tuple[Camera, Camera]:
@@ -60,23 +108,21 @@ def exposure(light: EnvironmentSampler) -> float:
     return 0.35 * 4 * np.pi / float(np.sum(bright * solid))
 
 
-def trace_frames(
-    solid: Solid,
-    surface: Surface,
-    actor: ScratchedActor,
+def trace_views(
+    glass: ScratchedGlass,
     light: EnvironmentSampler,
     *,
     size: int,
     samples: int,
     seed: int,
     progress: Callable[[float], None],
-) -> Frames:
-    """Both views, size x size pixels: ``samples`` paths a pixel, and by the shader."""
-    views = cameras(solid)
-    traced = [
+) -> tuple[tuple[Picture, Picture], NDArray[np.float32]]:
+    """Far and close view of size x size pixels: ``samples`` paths a pixel, and by the shader."""
+    views = cameras(glass.solid)
+    far, close = (
         trace(
-            solid,
-            surface,
+            glass.solid,
+            glass.surface,
             light,
             camera,
             width=size,
@@ -86,12 +132,12 @@ def trace_frames(
             progress=lambda fraction, number=number: progress((number + fraction) / 2),  # type: ignore[misc]
         )
         for number, camera in enumerate(views)
-    ]
+    )
     stage = [
-        draw_scratched(actor, light, camera, width=size, height=size, supersampling=2)[..., :3]
+        draw_scratched(glass.actor, light, camera, width=size, height=size, supersampling=2)
         for camera in views
     ]
-    return Frames(traced[0], traced[1], np.stack(stage))
+    return (far, close), np.stack([picture[..., :3] for picture in stage])
 
 
 def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
@@ -109,8 +155,7 @@ def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
 
 
 def moving_light(
-    solid: Solid,
-    actor: ScratchedActor,
+    glass: ScratchedGlass,
     light: EnvironmentSampler,
     *,
     count: int,
@@ -118,13 +163,15 @@ def moving_light(
     progress: Callable[[float], None],
 ) -> NDArray[np.uint8]:
     """The close view on the stage while the light turns once around: (count, size, size, 3)."""
-    camera = cameras(solid)[1]
+    camera = cameras(glass.solid)[1]
     pictures = []
     for number in range(count):
         progress(number / count)
         turned = make_environment_sampler(
             rotate_environment(light.radiance, 360.0 * number / count)
         )
-        drawn = draw_scratched(actor, turned, camera, width=size, height=size, supersampling=2)
+        drawn = draw_scratched(
+            glass.actor, turned, camera, width=size, height=size, supersampling=2
+        )
         pictures.append(drawn[..., :3])
     return to_8bit(np.stack(pictures) * exposure(light))

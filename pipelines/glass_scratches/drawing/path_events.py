@@ -12,7 +12,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.drawing.path_numbers import mixed, path_numbers, unit
-from pipelines.glass_scratches.layers.kernels import LayerArrays, filtered_coverage, scratch_at
+from pipelines.glass_scratches.layers.coverage import filtered_coverage
+from pipelines.glass_scratches.layers.feature_search import LayerArrays, scratch_at
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.sampling import Lobe, bin_of
 from pipelines.light.environment_lookup import radiance_from_direction
@@ -421,12 +422,8 @@ def _scatter(  # type: ignore[no-untyped-def]
         i_n = ex * normal[0] + ey * normal[1] + ez * normal[2]
         if i_n > 0.0 and density > 0.0:
             if side > 0.0:
-                scale = (
-                    factor
-                    * i_n
-                    * sampling.evaluate(lobe.rho, lobe.blur, part, ou, ov, on, iu, iv, i_n)
-                )
-                own = sampling.pdf(lobe.rho, lobe.share, lobe.blur, part, ou, ov, on, iu, iv, i_n)
+                scale = factor * i_n * sampling.evaluate(lobe, part, (ou, ov, on), (iu, iv, i_n))
+                own = sampling.pdf(lobe, part, (ou, ov, on), (iu, iv, i_n))
             else:
                 let_out = 1.0 - lean_factor(surface, iu, iv, i_n)
                 scale = let_out * i_n / (np.pi * surface.refraction**2)
@@ -444,20 +441,14 @@ def _scatter(  # type: ignore[no-untyped-def]
         if uniform:
             iu, iv, i_n = _even_direction(u1, u2)
             if side > 0.0:
-                gain = factor * sampling.evaluate(
-                    lobe.rho, lobe.blur, part, ou, ov, on, iu, iv, i_n
-                )
+                gain = factor * sampling.evaluate(lobe, part, (ou, ov, on), (iu, iv, i_n))
             else:
                 gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / (np.pi * surface.refraction**2)
             gain *= 2.0 * np.pi * i_n
         elif side > 0.0:
-            iu, iv, i_n = sampling.sample(
-                lobe.cdf, lobe.sines, lobe.blur, part, ou, ov, on, u1, u2, u3
-            )
+            iu, iv, i_n = sampling.sample(lobe, part, (ou, ov, on), u1, u2, u3)
             gain = returned
-            density = out_chance * sampling.pdf(
-                lobe.rho, lobe.share, lobe.blur, part, ou, ov, on, iu, iv, i_n
-            )
+            density = out_chance * sampling.pdf(lobe, part, (ou, ov, on), (iu, iv, i_n))
         else:
             iu, iv, i_n = _cosine_direction(u1, u2)
             gain = (1.0 - lean_factor(surface, iu, iv, i_n)) / surface.refraction**2

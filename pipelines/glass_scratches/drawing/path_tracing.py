@@ -40,8 +40,8 @@ from pipelines.glass_scratches.drawing.path_events import (
     advance,
 )
 from pipelines.glass_scratches.drawing.path_numbers import jitter_pixels
-from pipelines.glass_scratches.layers.kernels import LayerArrays
-from pipelines.glass_scratches.layers.scratch_layers import flatten_pyramid, pyramid
+from pipelines.glass_scratches.layers.coverage import flatten_pyramid, pyramid
+from pipelines.glass_scratches.layers.feature_search import LayerArrays
 from pipelines.glass_scratches.tables.bins import bin_weights
 from pipelines.glass_scratches.tables.sampling import Lobe
 from pipelines.glass_scratches.tables.scratch_table import Lean, check_index, interpolated_factor

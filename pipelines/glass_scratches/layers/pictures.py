@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.glass_scratches.layers.kernels import (
+from pipelines.glass_scratches.layers.arcs import arc_coordinates
+from pipelines.glass_scratches.layers.feature_search import (
     COSINE,
     CURVATURE,
     HALF_LENGTH,
@@ -20,14 +21,10 @@ from pipelines.glass_scratches.layers.kernels import (
     SINE,
     X,
     Y,
-    arc_coordinates,
 )
-from pipelines.glass_scratches.layers.scratch_layers import (
-    LayerSpec,
-    layer_arrays,
-    make_layers,
-    solve_thresholds,
-)
+from pipelines.glass_scratches.layers.features import layer_arrays
+from pipelines.glass_scratches.layers.scratch_layers import make_layers, solve_thresholds
+from pipelines.glass_scratches.layers.settings import LayerSpec
 
 WHITE = 1.25
 """The noise F1, in cells, that is shown white: of a Poisson process 0.7 % lies above it."""
@@ -51,7 +48,7 @@ def stages(spec: LayerSpec, seed: int, size: int, layer: int = 0) -> NDArray[np.
     noise = _noise(_even_cells(np.random.default_rng([seed, layer])), 1.0, size)
     made = make_layers(spec, seed)
     threshold = float(solve_thresholds(spec, seed)[layer])
-    stretched = _noise(layer_arrays(made).shapes[made.layer == layer], threshold, size)
+    stretched = _noise(layer_arrays(made).shapes[made.features.layer == layer], threshold, size)
     shown = [np.clip(field / WHITE, 0.0, 1.0) for field in (noise, stretched)]
     return np.rint(255 * np.stack([*shown, stretched < threshold])).astype(np.uint8)
 

@@ -18,33 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from pipelines.glass_scratches.layers.kernels import (
-    LayerArrays,
-    count_cells,
-    fill_cells,
-    filtered_coverage,
-    mean_opacities,
-    scratch_at,
-    visible_areas,
+from pipelines.glass_scratches.layers.coverage import visible_areas
+from pipelines.glass_scratches.layers.features import (
+    Features,
+    FloatArray,
+    Layers,
+    layer_arrays,
+    layers_of_features,
 )
 from pipelines.glass_scratches.layers.settings import LayerSpec
-
-__all__ = [
-    "LayerArrays",
-    "LayerSpec",
-    "Layers",
-    "coverage_maps",
-    "filtered_coverage",
-    "flatten_pyramid",
-    "join_features",
-    "layer_arrays",
-    "make_layers",
-    "pyramid",
-    "scratch_at",
-    "solve_thresholds",
-]
-
-FloatArray = NDArray[np.float32]
 
 # A feature and its copies in the next tiles may not overlap: it reaches half a tile at most.
 _LONGEST, _WIDEST = 0.5, 0.5
@@ -56,42 +38,10 @@ _DIG_SIZE = 0.4
 _ALIKE = 0.6
 """Correlation of a scratch's width with its length."""
 
-_MOST_CELLS = 1024
 _POINTS = 80_000
 """Of which the coverage of a layer is measured: to about 0.2 % of itself."""
 
 _LARGEST_THRESHOLD = 16.0
-
-
-class Layers(NamedTuple):
-    """Scratches of L layers, n in all, sorted by layer, with the grid that finds them.
-
-    angle: (L,) float32 direction of each layer in [0, pi), radians from x towards y.
-    layer: (n,) int32. centre: (n, 2) float32 x, y in [0, 1), middle of the scratch.
-    turn: (n,) float32 direction at the middle less the layer's, radians.
-    half_length, half_width: (n,) float32, tiles; the threshold is in them.
-    curvature: (n,) float32, 1 / tile, positive to the left. strength: (n,) float32 in (0, 1].
-    seed: (n,) uint32 of its fading and breaks. is_dig: (n,) bool.
-    cells: G, cells a side. cell_start: (L * G * G + 1,) int64, cell_items: int32, the features that
-        may cover the cell (layer * G + row) * G + column; row 0 lies at y = 0.
-    fading, breaks: those of the spec.
-    """
-
-    angle: FloatArray
-    layer: NDArray[np.int32]
-    centre: FloatArray
-    turn: FloatArray
-    half_length: FloatArray
-    half_width: FloatArray
-    curvature: FloatArray
-    strength: FloatArray
-    seed: NDArray[np.uint32]
-    is_dig: NDArray[np.bool_]
-    cells: int
-    cell_start: NDArray[np.int64]
-    cell_items: NDArray[np.int32]
-    fading: float
-    breaks: float
 
 
 class _Draw(NamedTuple):
@@ -119,76 +69,15 @@ def make_layers(spec: LayerSpec, seed: int) -> Layers:
     spec.validate()
     angles, draws = _draw(spec, seed)
     thresholds = _thresholds(spec, angles, draws)
-    sized = [_sized(draw, t) for draw, t in zip(draws, thresholds, strict=True)]
-    number = np.repeat(np.arange(spec.layers, dtype=np.int32), [len(d.centre) for d in draws])
-    columns = [np.concatenate(column) for column in zip(*sized, strict=True)]
-    return join_features(angles, number, *columns, fading=spec.fading, breaks=spec.breaks)
+    sized = [_sized(*each) for each in zip(range(spec.layers), draws, thresholds, strict=True)]
+    features = Features(*(np.concatenate(column) for column in zip(*sized, strict=True)))
+    return layers_of_features(angles, features, fading=spec.fading, breaks=spec.breaks)
 
 
 def solve_thresholds(spec: LayerSpec, seed: int) -> NDArray[np.float64]:
     """Thresholds (L,) of the layers of ``make_layers``: the spec's, or what its coverage needs."""
     spec.validate()
     return _thresholds(spec, *_draw(spec, seed))
-
-
-def join_features(
-    angle: FloatArray,
-    layer: NDArray[np.int32],
-    centre: FloatArray,
-    turn: FloatArray,
-    half_length: FloatArray,
-    half_width: FloatArray,
-    curvature: FloatArray,
-    strength: FloatArray,
-    seed: NDArray[np.uint32],
-    is_dig: NDArray[np.bool_],
-    *,
-    fading: float = 0.0,
-    breaks: float = 0.0,
-) -> Layers:
-    """Make the layers of their features, as ``Layers`` has them: builds the search grid."""
-    count = max(np.bincount(layer, minlength=1).max(), 1)
-    # As many cells as make the lists short (scratches cross about one cell in `cells` each) and
-    # no more than that, for the grid should stay in the cache.
-    lengths = 2.0 * float(half_length.astype(np.float64).sum()) / len(angle)
-    cells = int(np.clip(math.ceil(max(lengths, math.sqrt(count))), 4, _MOST_CELLS))
-    shapes = _shapes(angle, layer, centre, turn, half_length, half_width, curvature, strength)
-    per_cell = np.zeros((len(angle), cells * cells), np.int64)
-    count_cells(shapes, layer, cells, per_cell)
-    start = np.concatenate([[0], np.cumsum(per_cell)])
-    items = np.empty(start[-1], np.int32)
-    fill_cells(shapes, layer, cells, start[:-1].reshape(per_cell.shape).copy(), items)
-    return Layers(
-        angle, layer, centre, turn, half_length, half_width, curvature, strength, seed, is_dig,
-        cells, start, items, float(fading), float(breaks),
-    )  # fmt: skip
-
-
-def layer_arrays(layers: Layers) -> LayerArrays:
-    """Pack the layers for ``scratch_at``; worth keeping, since it copies."""
-    shapes = _shapes(
-        layers.angle, layers.layer, layers.centre, layers.turn, layers.half_length,
-        layers.half_width, layers.curvature, layers.strength,
-    )  # fmt: skip
-    return LayerArrays(
-        layers.angle, shapes, layers.turn, layers.seed, layers.is_dig,
-        layers.cells, layers.cell_start, layers.cell_items, layers.fading, layers.breaks,
-    )  # fmt: skip
-
-
-def _shapes(
-    angle: FloatArray,
-    layer: NDArray[np.int32],
-    centre: FloatArray,
-    turn: FloatArray,
-    half_length: FloatArray,
-    half_width: FloatArray,
-    curvature: FloatArray,
-    strength: FloatArray,
-) -> FloatArray:
-    way = angle[layer].astype(np.float64) + turn
-    columns = (*centre.T, np.cos(way), np.sin(way), half_length, half_width, curvature, strength)
-    return np.stack(columns, axis=-1).astype(np.float32)
 
 
 def _draw(spec: LayerSpec, seed: int) -> tuple[FloatArray, list[_Draw]]:
@@ -230,16 +119,25 @@ def _draw_layer(spec: LayerSpec, rng: np.random.Generator) -> _Draw:
     )
 
 
-def _sized(draw: _Draw, threshold: float) -> tuple[NDArray, ...]:
-    """Columns of ``Layers``, centre to is_dig."""
+def _sized(layer: int, draw: _Draw, threshold: float) -> Features:
+    """The features of one layer at a threshold."""
     bent = draw.bend != 0.0
     half_length = np.minimum(threshold * draw.length, np.where(bent, _LONGEST_ARC, _LONGEST))
     half_width = np.minimum(threshold * draw.width, np.where(bent, _WIDEST_ARC, _WIDEST))
     # Arcs may not be so tight that their inner side folds over.
     tightest = 0.5 / half_width
     curvature = np.clip(draw.bend / (2.0 * half_length), -tightest, tightest)
-    single = (draw.turn, half_length, half_width, curvature, draw.strength)
-    return (draw.centre, *(column.astype(np.float32) for column in single), draw.seed, draw.is_dig)
+    return Features(
+        layer=np.full(len(draw.centre), layer, np.int32),
+        centre=draw.centre,
+        turn=draw.turn.astype(np.float32),
+        half_length=half_length.astype(np.float32),
+        half_width=half_width.astype(np.float32),
+        curvature=curvature.astype(np.float32),
+        strength=draw.strength.astype(np.float32),
+        seed=draw.seed,
+        is_dig=draw.is_dig,
+    )
 
 
 # ---- thresholds --------------------------------------------------------------------------------
@@ -278,52 +176,8 @@ def _solve(spec: LayerSpec, angle: FloatArray, draw: _Draw, coverage: float) -> 
 
 def _coverage(spec: LayerSpec, angle: FloatArray, draw: _Draw, threshold: float) -> float:
     count = len(draw.centre)
-    alone = join_features(
-        angle, np.zeros(count, np.int32), *_sized(draw, threshold),
-        fading=spec.fading, breaks=spec.breaks,
-    )  # fmt: skip
+    features = _sized(0, draw, threshold)
+    alone = layers_of_features(angle, features, fading=spec.fading, breaks=spec.breaks)
     areas = np.empty(count)
     visible_areas(layer_arrays(alone), 0, int(np.clip(_POINTS // count, 4, 1 << 16)), areas)
     return max(float(areas.sum()), 1e-12)
-
-
-# ---- coverage ----------------------------------------------------------------------------------
-
-
-def coverage_maps(layers: Layers, resolution: int, samples: int = 16) -> FloatArray:
-    """Mean opacity (L, R, R) in each texel, of ``samples`` points in it.
-
-    Row 0 lies at y = 0, column 0 at x = 0. Raises ValueError for less than one texel or point.
-    """
-    if resolution < 1:
-        raise ValueError(f"resolution of the coverage is {resolution}; expected 1 or more.")
-    if samples < 1:
-        raise ValueError(f"samples of the coverage is {samples}; expected 1 or more.")
-    out = np.empty((len(layers.angle), resolution, resolution), np.float32)
-    mean_opacities(layer_arrays(layers), samples, out)
-    return out
-
-
-def pyramid(maps: FloatArray) -> list[FloatArray]:
-    """Mip levels (L, R / 2^k, R / 2^k) of maps (L, R, R), down to one texel; means are kept.
-
-    Raises ValueError for maps that are not square or whose side is not a power of two.
-    """
-    if maps.ndim != 3 or maps.shape[1] != maps.shape[2] or maps.shape[1].bit_count() != 1:
-        raise ValueError(
-            f"shape of the maps is {maps.shape}; expected (layers, R, R), R a power of two."
-        )
-    levels = [np.ascontiguousarray(maps, dtype=np.float32)]
-    # Doubles between the levels, so that roundings do not add up.
-    level = maps.astype(np.float64)
-    while level.shape[1] > 1:
-        half = level.shape[1] // 2
-        level = level.reshape(len(level), half, 2, half, 2).mean(axis=(2, 4))
-        levels.append(level.astype(np.float32))
-    return levels
-
-
-def flatten_pyramid(levels: list[FloatArray]) -> tuple[FloatArray, NDArray[np.int64]]:
-    """All levels in one array, and where each begins, the end last (levels + 1,)."""
-    offsets = np.concatenate([[0], np.cumsum([level.size for level in levels])])
-    return np.concatenate([level.ravel() for level in levels]), offsets

@@ -21,6 +21,8 @@ from pipelines.glass_scratches.tables.exact import check_albedo
 PLACES = 16
 """Parts of the opening's width for which paths are counted apart."""
 _BOUNCES = 100_000
+_KEPT, _LOST = -1, -2
+"""In place of the bin that a path leaves into."""
 
 
 class PathCounts(NamedTuple):
@@ -68,15 +70,17 @@ def shoot(
     alone, not on the number of threads. Raises ValueError as :func:`blur_of`, ``check_albedo``.
     """
     check_albedo(albedo)
-    blur = blur_of(roughness)
-    edges = bin_edges(bins)
+    walls = _walls(profile, albedo, blur_of(roughness))
     chosen = np.arange(bins) if incidence is None else incidence
-    leaving = np.zeros((bins, PLACES, bins), np.int64)
-    squares = np.zeros((bins, bins), np.int64)
-    kept = np.zeros(bins, np.int64)
-    sines = np.sin(edges)
-    _shoot(profile, sines, chosen, rays, paths_per_ray, albedo, blur, seed, leaving, squares, kept)
-    return PathCounts(leaving, squares, kept, rays, paths_per_ray)
+    counts = PathCounts(
+        np.zeros((bins, PLACES, bins), np.int64),
+        np.zeros((bins, bins), np.int64),
+        np.zeros(bins, np.int64),
+        rays,
+        paths_per_ray,
+    )
+    _shoot(walls, np.sin(bin_edges(bins)), chosen, seed, counts)
+    return counts
 
 
 class PathTable(NamedTuple):
@@ -131,92 +135,144 @@ def _folded(sine):  # type: ignore[no-untyped-def]
     return turn - 1.0 if turn <= 2.0 else 3.0 - turn
 
 
+class _Walls(NamedTuple):
+    """The pieces of a profile (P,): where each begins, its direction, its length; and what they do
+    to light: the part that they give back, the blur of its sine."""
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    along_x: NDArray[np.float64]
+    along_y: NDArray[np.float64]
+    length: NDArray[np.float64]
+    opening: float
+    albedo: float
+    blur: float
+
+
+class _Ray(NamedTuple):
+    """From a point, in a direction; ``piece``: the one that it starts from, or -1."""
+
+    piece: int
+    x: float
+    y: float
+    dx: float
+    dy: float
+
+
+def _walls(profile: NDArray[np.float64], albedo: float, blur: float) -> _Walls:
+    dx, dy = np.diff(profile, axis=0).T
+    length = np.sqrt(dx * dx + dy * dy)
+    x, y = profile[:-1].T.copy()
+    opening = float(profile[-1, 0] - profile[0, 0])
+    return _Walls(x, y, dx / length, dy / length, length, opening, albedo, blur)
+
+
 @njit(cache=True, parallel=True)
-def _shoot(  # type: ignore[no-untyped-def]
-    profile, sines, chosen, rays, paths, albedo, blur, seed, leaving, squares, kept
-):
-    pieces = len(profile) - 1
-    bins = len(sines) - 1
-    left, width = profile[0, 0], profile[-1, 0] - profile[0, 0]
-    length = np.empty(pieces)
-    tx, ty = np.empty(pieces), np.empty(pieces)
-    for piece in range(pieces):
-        dx = profile[piece + 1, 0] - profile[piece, 0]
-        dy = profile[piece + 1, 1] - profile[piece, 1]
-        length[piece] = np.sqrt(dx * dx + dy * dy)
-        tx[piece], ty[piece] = dx / length[piece], dy / length[piece]
-    lambert = np.isinf(blur)
+def _shoot(walls, sines, chosen, seed, counts):  # type: ignore[no-untyped-def]
     for number in prange(len(chosen)):
-        bin_in = chosen[number]
-        state = np.uint64(seed) * np.uint64(0xD1342543DE82EF95) + np.uint64(bin_in + 1) * np.uint64(
-            0xAF251AF3B0F025B5
-        )
-        state, _ = _next(state)
-        own = np.zeros(bins, np.int64)
-        touched = np.empty(paths, np.int64)
-        for _ray in range(rays):
-            state, u = _next(state)
-            place = min(int(u * leaving.shape[1]), leaving.shape[1] - 1)
-            x0 = left + width * u
-            state, u = _next(state)
-            sine = sines[bin_in] + u * (sines[bin_in + 1] - sines[bin_in])
-            dx0, dy0 = -sine, -np.sqrt(max(1.0 - sine * sine, 0.0))
-            first = _hit(profile, tx, ty, length, pieces, -1, x0, 0.0, dx0, dy0)
-            reached = 0
-            for _path in range(paths):
-                if first[0] < 0:  # along the opening, between the two ends: leaves as it came
-                    break
-                piece, along = first
-                dx, dy = dx0, dy0
-                for _bounce in range(_BOUNCES):
-                    state, u = _next(state)
-                    if u >= albedo:
-                        kept[bin_in] += 1
-                        break
-                    state, u = _next(state)
-                    if lambert:
-                        s = 2.0 * u - 1.0
-                    else:
-                        s = dx * tx[piece] + dy * ty[piece]
-                        if blur > 0.0:
-                            state, v = _next(state)
-                            normal = np.sqrt(-2.0 * np.log(1.0 - u)) * np.cos(2.0 * np.pi * v)
-                            s = _folded(s + blur * normal)
-                    c = np.sqrt(max(1.0 - s * s, 0.0))
-                    x = profile[piece, 0] + along * tx[piece]
-                    y = profile[piece, 1] + along * ty[piece]
-                    dx = s * tx[piece] - c * ty[piece]
-                    dy = s * ty[piece] + c * tx[piece]
-                    piece, along = _hit(profile, tx, ty, length, pieces, piece, x, y, dx, dy)
-                    if piece < 0:
-                        angle = np.arctan2(dx, max(dy, 0.0))
-                        out = int((angle / np.pi + 0.5) * bins)
-                        out = min(max(out, 0), bins - 1)
-                        leaving[bin_in, place, out] += 1
-                        if own[out] == 0:
-                            touched[reached] = out
-                            reached += 1
-                        own[out] += 1
-                        break
-            for index in range(reached):
-                out = touched[index]
-                squares[bin_in, out] += own[out] * own[out]
-                own[out] = 0
+        _shoot_from(walls, sines, chosen[number], seed, counts)
+
+
+@njit(cache=True)
+def _shoot_from(walls, sines, bin_in, seed, counts):  # type: ignore[no-untyped-def]
+    """Count the paths of all rays from one bin."""
+    state = np.uint64(seed) * np.uint64(0xD1342543DE82EF95) + np.uint64(bin_in + 1) * np.uint64(
+        0xAF251AF3B0F025B5
+    )
+    state, _ = _next(state)
+    leaving, squares = counts.leaving[bin_in], counts.squares[bin_in]
+    own = np.zeros(len(squares), np.int64)  # of the ray's paths, by the bin that they leave into
+    touched = np.empty(counts.paths_per_ray, np.int64)
+    for _ray in range(counts.rays):
+        state, u = _next(state)
+        place = min(int(u * len(leaving)), len(leaving) - 1)
+        x = walls.x[0] + walls.opening * u
+        state, u = _next(state)
+        sine = sines[bin_in] + u * (sines[bin_in + 1] - sines[bin_in])
+        ray = _Ray(-1, x, 0.0, -sine, -np.sqrt(max(1.0 - sine * sine, 0.0)))
+        piece, along = _hit(walls, ray)
+        if piece < 0:  # along the opening, between the two ends: leaves as it came
+            continue
+        reached = 0
+        for _path in range(counts.paths_per_ray):
+            state, out = _bin_of_path(walls, ray, piece, along, state, len(squares))
+            if out == _KEPT:
+                counts.kept[bin_in] += 1
+            elif out >= 0:
+                leaving[place, out] += 1
+                if own[out] == 0:
+                    touched[reached] = out
+                    reached += 1
+                own[out] += 1
+        for index in range(reached):
+            out = touched[index]
+            squares[out] += own[out] * own[out]
+            own[out] = 0
 
 
 @njit(cache=True, inline="always")
-def _hit(profile, tx, ty, length, pieces, own, x, y, dx, dy):  # type: ignore[no-untyped-def]
+def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-untyped-def]
+    """Follow a path that meets a piece so far along: random state, and the bin that it leaves into.
+
+    ``_KEPT`` where the walls keep it, ``_LOST`` where it bounces for ever.
+    """
+    dx, dy = ray.dx, ray.dy
+    for _bounce in range(_BOUNCES):
+        state, u = _next(state)
+        if u >= walls.albedo:
+            return state, _KEPT
+        sine_in = dx * walls.along_x[piece] + dy * walls.along_y[piece]
+        state, sine = _bounced_sine(sine_in, walls.blur, state)
+        bounced = _bounced_ray(walls, piece, along, sine)
+        piece, along = _hit(walls, bounced)
+        dx, dy = bounced.dx, bounced.dy
+        if piece < 0:
+            angle = np.arctan2(dx, max(dy, 0.0))
+            return state, min(max(int((angle / np.pi + 0.5) * bins), 0), bins - 1)
+    return state, _LOST
+
+
+@njit(cache=True, inline="always")
+def _bounced_sine(sine, blur, state):  # type: ignore[no-untyped-def]
+    """Random state, and the sine after a bounce, to the facet's normal, of the one before."""
+    state, u = _next(state)
+    if np.isinf(blur):
+        return state, 2.0 * u - 1.0
+    if blur > 0.0:
+        state, v = _next(state)
+        normal = np.sqrt(-2.0 * np.log(1.0 - u)) * np.cos(2.0 * np.pi * v)
+        sine = _folded(sine + blur * normal)
+    return state, sine
+
+
+@njit(cache=True, inline="always")
+def _bounced_ray(walls, piece, along, sine):  # type: ignore[no-untyped-def]
+    """The ray that leaves a piece, so far along it, by the sine of its angle to the normal."""
+    tx, ty = walls.along_x[piece], walls.along_y[piece]
+    cosine = np.sqrt(max(1.0 - sine * sine, 0.0))
+    return _Ray(
+        piece,
+        walls.x[piece] + along * tx,
+        walls.y[piece] + along * ty,
+        sine * tx - cosine * ty,
+        sine * ty + cosine * tx,
+    )
+
+
+@njit(cache=True, inline="always")
+def _hit(walls, ray):  # type: ignore[no-untyped-def]
     """The piece that a ray meets first from its inner side, and how far along; -1 for none."""
     nearest, found, where = np.inf, -1, 0.0
-    for piece in range(pieces):
-        facing = dx * ty[piece] - dy * tx[piece]
-        if piece == own or facing <= 0.0:
+    for piece in range(len(walls.x)):
+        tx, ty, length = walls.along_x[piece], walls.along_y[piece], walls.length[piece]
+        facing = ray.dx * ty - ray.dy * tx
+        if piece == ray.piece or facing <= 0.0:
             continue
-        ox, oy = profile[piece, 0] - x, profile[piece, 1] - y
-        distance = (ox * ty[piece] - oy * tx[piece]) / facing
-        along = (ox * dy - oy * dx) / facing
+        ox, oy = walls.x[piece] - ray.x, walls.y[piece] - ray.y
+        distance = (ox * ty - oy * tx) / facing
+        along = (ox * ray.dy - oy * ray.dx) / facing
         # A hair more than the piece: no ray slips through where two of them meet.
-        slack = 1e-12 * length[piece]
-        if distance >= 0.0 and -slack <= along <= length[piece] + slack and distance < nearest:
-            nearest, found, where = distance, piece, min(max(along, 0.0), length[piece])
+        slack = 1e-12 * length
+        if distance >= 0.0 and -slack <= along <= length + slack and distance < nearest:
+            nearest, found, where = distance, piece, min(max(along, 0.0), length)
     return found, where

@@ -29,6 +29,14 @@ _LEAST_BLUR = 0.01
 """Of the lean of a mirror: lobes of half a degree can still be evaluated."""
 
 
+class Direction(NamedTuple):
+    """A unit vector in the scratch's frame: along the scratch, across it, and its normal."""
+
+    u: float
+    v: float
+    n: float
+
+
 class Lobe(NamedTuple):
     """What the kernels need of a table.
 
@@ -123,34 +131,39 @@ def lean_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def evaluate(rho, blur, place, ou, ov, on, iu, iv, i_n):  # type: ignore[no-untyped-def]
-    """f of view o and light i, 1/sr; 0 below the surface."""
+def evaluate(lobe, place, view, light):  # type: ignore[no-untyped-def]
+    """f of a view and a light (:class:`Direction`), 1/sr; 0 below the surface."""
+    ou, ov, on = view
+    iu, iv, i_n = light
     if on <= 0.0 or i_n <= 0.0:
         return 0.0
-    bins = rho.shape[1]
-    table = rho[place, bin_of(ov, on, bins), bin_of(iv, i_n, bins)]
-    return 2.0 / np.pi**2 * table * lean_kernel(quantile(ou), quantile(iu), blur)
+    bins = lobe.rho.shape[1]
+    table = lobe.rho[place, bin_of(ov, on, bins), bin_of(iv, i_n, bins)]
+    return 2.0 / np.pi**2 * table * lean_kernel(quantile(ou), quantile(iu), lobe.blur)
 
 
 @njit(cache=True)
-def pdf(rho, share, blur, place, ou, ov, on, iu, iv, i_n):  # type: ignore[no-untyped-def]
-    """Density per steradian with which :func:`sample` returns the light i."""
+def pdf(lobe, place, view, light):  # type: ignore[no-untyped-def]
+    """Density per steradian with which :func:`sample` returns the light."""
+    _, ov, on = view
+    _, _, i_n = light
     if on <= 0.0 or i_n <= 0.0:
         return 0.0
-    kept = share[place, bin_of(ov, on, rho.shape[1])]
+    kept = lobe.share[place, bin_of(ov, on, lobe.rho.shape[1])]
     if kept <= 0.0:
         return 0.0
-    return evaluate(rho, blur, place, ou, ov, on, iu, iv, i_n) * i_n / kept
+    return evaluate(lobe, place, view, light) * i_n / kept
 
 
 @njit(cache=True)
-def sample(cdf, sines, blur, place, ou, ov, on, u1, u2, u3):  # type: ignore[no-untyped-def]
-    """A light (u, v, n) for the view o, from numbers u1, u2, u3 in [0, 1), u3 only where k = 1.
+def sample(lobe, place, view, u1, u2, u3):  # type: ignore[no-untyped-def]
+    """A light for the view, from numbers u1, u2, u3 in [0, 1), u3 only where k = 1.
 
     Its weight f cos / pdf is ``share``: by Eq. 5 all that is left to look up is the light.
     """
-    bins = cdf.shape[1]
-    row = cdf[place, bin_of(ov, on, bins)]
+    ou, ov, on = view
+    bins = lobe.cdf.shape[1]
+    row = lobe.cdf[place, bin_of(ov, on, bins)]
     low, high = 0, bins
     while high - low > 1:
         middle = (low + high) // 2
@@ -160,15 +173,20 @@ def sample(cdf, sines, blur, place, ou, ov, on, u1, u2, u3):  # type: ignore[no-
             high = middle
     width = row[low + 1] - row[low]
     inside = min(max((u1 - row[low]) / width, 0.0), 1.0) if width > 0 else 0.5
-    sine = sines[low] + inside * (sines[low + 1] - sines[low])
-    if np.isinf(blur):
-        along = np.sqrt(u2) * np.cos(2.0 * np.pi * u3)  # the semicircle's law
-    else:
-        normal = np.sqrt(-2.0 * np.log(1.0 - u2)) * np.cos(2.0 * np.pi * u3)
-        c = 1.0 - quantile(ou) + blur * normal
-        c = np.fmod(c, 2.0)
-        if c < 0.0:
-            c += 2.0
-        along = lean_sine(2.0 - c if c > 1.0 else c)
+    sine = lobe.sines[low] + inside * (lobe.sines[low + 1] - lobe.sines[low])
+    along = _sampled_lean(ou, lobe.blur, u2, u3)
     rest = np.sqrt(max(1.0 - along * along, 0.0))
-    return along, rest * sine, rest * np.sqrt(max(1.0 - sine * sine, 0.0))
+    return Direction(along, rest * sine, rest * np.sqrt(max(1.0 - sine * sine, 0.0)))
+
+
+@njit(cache=True)
+def _sampled_lean(view_sine, blur, u2, u3):  # type: ignore[no-untyped-def]
+    """The sine of a light's lean, drawn for that of a view."""
+    if np.isinf(blur):
+        return np.sqrt(u2) * np.cos(2.0 * np.pi * u3)  # the semicircle's law
+    normal = np.sqrt(-2.0 * np.log(1.0 - u2)) * np.cos(2.0 * np.pi * u3)
+    c = 1.0 - quantile(view_sine) + blur * normal
+    c = np.fmod(c, 2.0)
+    if c < 0.0:
+        c += 2.0
+    return lean_sine(2.0 - c if c > 1.0 else c)

@@ -17,14 +17,11 @@ from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing import path_tracing
 from pipelines.glass_scratches.drawing.path_events import Surface, lean_factor, reflectance
 from pipelines.glass_scratches.drawing.path_tracing import Picture, Strategy, make_surface, trace
-from pipelines.glass_scratches.layers.kernels import LayerArrays
-from pipelines.glass_scratches.layers.scratch_layers import (
-    LayerSpec,
-    coverage_maps,
-    layer_arrays,
-    make_layers,
-    scratch_at,
-)
+from pipelines.glass_scratches.layers.coverage import coverage_maps
+from pipelines.glass_scratches.layers.feature_search import LayerArrays, scratch_at
+from pipelines.glass_scratches.layers.features import layer_arrays
+from pipelines.glass_scratches.layers.scratch_layers import make_layers
+from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables.bins import bin_weights
 from pipelines.glass_scratches.tables.profiles import built_in_profile
 from pipelines.glass_scratches.tables.sampling import make_lobe

@@ -12,27 +12,28 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.glass_scratches.layers.kernels import (
-    KNOTS,
-    LayerArrays,
-    nearest_feature,
-    noise_along,
-    visible_areas,
-)
-from pipelines.glass_scratches.layers.pictures import WHITE, layers_picture, stages
-from pipelines.glass_scratches.layers.scratch_layers import (
-    Layers,
-    LayerSpec,
+from pipelines.glass_scratches.layers.coverage import (
     coverage_maps,
     filtered_coverage,
     flatten_pyramid,
-    join_features,
-    layer_arrays,
-    make_layers,
     pyramid,
-    scratch_at,
-    solve_thresholds,
+    visible_areas,
 )
+from pipelines.glass_scratches.layers.feature_noise import KNOTS, noise_along
+from pipelines.glass_scratches.layers.feature_search import (
+    LayerArrays,
+    nearest_feature,
+    scratch_at,
+)
+from pipelines.glass_scratches.layers.features import (
+    Features,
+    Layers,
+    layer_arrays,
+    layers_of_features,
+)
+from pipelines.glass_scratches.layers.pictures import WHITE, layers_picture, stages
+from pipelines.glass_scratches.layers.scratch_layers import make_layers, solve_thresholds
+from pipelines.glass_scratches.layers.settings import LayerSpec
 
 Floats = NDArray[np.float64]
 
@@ -83,11 +84,18 @@ def one_scratch(
     def column(value: float) -> NDArray[np.float32]:
         return np.array([value], np.float32)
 
-    return join_features(
-        column(angle), np.zeros(1, np.int32), np.array([centre], np.float32), column(0.0),
-        column(half_length), column(half_width), column(curvature), column(strength),
-        np.array([seed], np.uint32), np.zeros(1, np.bool_), fading=fading, breaks=breaks,
-    )  # fmt: skip
+    features = Features(
+        layer=np.zeros(1, np.int32),
+        centre=np.array([centre], np.float32),
+        turn=column(0.0),
+        half_length=column(half_length),
+        half_width=column(half_width),
+        curvature=column(curvature),
+        strength=column(strength),
+        seed=np.array([seed], np.uint32),
+        is_dig=np.zeros(1, np.bool_),
+    )
+    return layers_of_features(column(angle), features, fading=fading, breaks=breaks)
 
 
 # ---- search without a grid ---------------------------------------------------------------------
@@ -117,10 +125,11 @@ def noise(seed: int, place: float) -> float:
 
 def state(layers: Layers, i: int, s: float) -> tuple[float, float]:
     """Opacity and relative width along a scratch."""
-    opacity = float(layers.strength[i])
-    if layers.is_dig[i]:
+    features = layers.features
+    opacity = float(features.strength[i])
+    if features.is_dig[i]:
         return opacity, 1.0
-    seed = int(layers.seed[i])
+    seed = int(features.seed[i])
     place = KNOTS * (s + 1) / 2 + hashed(seed, -1)
     left = 1.0
     if layers.breaks:
@@ -134,13 +143,14 @@ def state(layers: Layers, i: int, s: float) -> tuple[float, float]:
 def search(layers: Layers, layer: int, x: float, y: float) -> tuple[float, float, float, int]:
     """All features, all nine copies of each; arcs by the centre of their circle."""
     best = (1.0, (0.0, 0.0, 0.0, -1))
-    own = np.flatnonzero(layers.layer == layer)
-    way = float(layers.angle[layer]) + layers.turn[own].astype(np.float64)
-    bend = layers.curvature[own].astype(np.float64)
-    length, width = layers.half_length[own], layers.half_width[own]
+    features = layers.features
+    own = np.flatnonzero(features.layer == layer)
+    way = float(layers.angle[layer]) + features.turn[own].astype(np.float64)
+    bend = features.curvature[own].astype(np.float64)
+    length, width = features.half_length[own], features.half_width[own]
     for shift_x in (-1, 0, 1):
         for shift_y in (-1, 0, 1):
-            d = (x + shift_x, y + shift_y) - layers.centre[own].astype(np.float64)
+            d = (x + shift_x, y + shift_y) - features.centre[own].astype(np.float64)
             px = d[:, 0] * np.cos(way) + d[:, 1] * np.sin(way)
             py = d[:, 1] * np.cos(way) - d[:, 0] * np.sin(way)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -168,21 +178,22 @@ def test_the_grid_finds_what_a_search_of_everything_finds(name: str) -> None:
     layers = make_layers(SPECS[name], 11)
     rng = np.random.default_rng(5)
     # Half of the points in scratches, so that thin ones are met.
-    chosen = rng.integers(0, len(layers.layer), 150)
-    offset = 1.2 * layers.half_width[chosen] * rng.standard_normal(150)
-    along = layers.half_length[chosen] * rng.uniform(-1, 1, 150)
-    way = layers.angle[layers.layer[chosen]] + layers.turn[chosen]
-    inside = layers.centre[chosen] + np.stack(
+    features = layers.features
+    chosen = rng.integers(0, len(features.layer), 150)
+    offset = 1.2 * features.half_width[chosen] * rng.standard_normal(150)
+    along = features.half_length[chosen] * rng.uniform(-1, 1, 150)
+    way = layers.angle[features.layer[chosen]] + features.turn[chosen]
+    inside = features.centre[chosen] + np.stack(
         [along * np.cos(way) - offset * np.sin(way), along * np.sin(way) + offset * np.cos(way)], -1
     )
     points = np.concatenate([inside % 1.0, rng.random((150, 2))])
-    number = np.concatenate([layers.layer[chosen], rng.integers(0, SPECS[name].layers, 150)])
+    number = np.concatenate([features.layer[chosen], rng.integers(0, SPECS[name].layers, 150)])
     found, item = ask(layers, number, points)
     expected = np.array([search(layers, k, x, y) for k, (x, y) in zip(number, points, strict=True)])
     assert 50 < np.sum(item >= 0) < 300
     np.testing.assert_array_equal(item, expected[:, 3])
     # Directions are kept as float32 cosines: parts of 1e-7 of a half length, in half widths.
-    slack = 4e-7 * (1 + (layers.half_length / layers.half_width).max())
+    slack = 4e-7 * (1 + (features.half_length / features.half_width).max())
     # A place across is v over a width that goes to 0 at the tips.
     near_tip = np.abs(found[:, 1]) > 0.999
     difference = np.abs(found - expected[:, :3])
@@ -251,9 +262,9 @@ def test_the_covered_points_of_a_scratch_lie_along_its_layers_direction() -> Non
     layers = make_layers(spec, 2)
     rng = np.random.default_rng(3)
     for layer in range(5):
-        first = int(np.flatnonzero(layers.layer == layer)[0])
+        first = int(np.flatnonzero(layers.features.layer == layer)[0])
         near = rng.uniform(-0.4, 0.4, (60_000, 2))
-        _, item = ask(layers, np.full(60_000, layer), layers.centre[first] + near)
+        _, item = ask(layers, np.full(60_000, layer), layers.features.centre[first] + near)
         _, vectors = np.linalg.eigh(np.cov(near[item == first].T))
         found = math.atan2(vectors[1, 1], vectors[0, 1])
         away = (found - layers.angle[layer] + math.pi / 2) % math.pi - math.pi / 2
@@ -300,15 +311,17 @@ def test_the_mean_coverage_is_that_of_a_poisson_process(
 
 def test_spread_keeps_the_mean_area() -> None:
     layers = make_layers(LayerSpec(length=0.03, width=0.002, layers=8, spread=0.4, digs=0.5), 4)
-    area = layers.half_length * layers.half_width.astype(np.float64)
-    scratch = area[~layers.is_dig] / (0.03 * 0.002 * 0.1**2)
+    features = layers.features
+    area = features.half_length * features.half_width.astype(np.float64)
+    scratch = area[~features.is_dig] / (0.03 * 0.002 * 0.1**2)
     assert scratch.mean() == pytest.approx(1.0, abs=4 * scratch.std() / math.sqrt(len(scratch)))
-    pit = area[layers.is_dig]
+    pit = area[features.is_dig]
     assert (pit > 0).all()
     np.testing.assert_array_equal(
-        layers.half_length[layers.is_dig], layers.half_width[layers.is_dig]
+        features.half_length[features.is_dig],
+        features.half_width[features.is_dig],
     )
-    assert 0.0 < layers.strength.min() < layers.strength.max() <= 1.0
+    assert 0.0 < features.strength.min() < features.strength.max() <= 1.0
 
 
 @pytest.mark.parametrize(
@@ -330,19 +343,24 @@ def test_a_layer_covers_what_was_asked_for(spec: LayerSpec, coverage: float) -> 
     assert thresholds.shape == (2,)
     if spec.spread == spec.digs == 0:
         made = make_layers(spec, 6)
-        np.testing.assert_allclose(made.half_width, spec.width * thresholds[made.layer], rtol=1e-6)
+        np.testing.assert_allclose(
+            made.features.half_width, spec.width * thresholds[made.features.layer], rtol=1e-6
+        )
 
 
 def test_visible_areas_add_up_to_the_coverage_of_the_maps() -> None:
     layers = make_layers(WORN, 8)
     maps = coverage_maps(layers, 256, 36).mean(axis=(1, 2), dtype=np.float64)
     for layer in range(3):
-        areas = np.empty(np.sum(layers.layer == layer))
-        own = layers.layer == layer
-        alone = join_features(
-            layers.angle[layer : layer + 1], np.zeros(len(areas), np.int32),
-            *(column[own] for column in layers[2:10]), fading=WORN.fading, breaks=WORN.breaks,
-        )  # fmt: skip
+        areas = np.empty(np.sum(layers.features.layer == layer))
+        own = layers.features.layer == layer
+        features = Features(*(column[own] for column in layers.features))
+        alone = layers_of_features(
+            layers.angle[layer : layer + 1],
+            features._replace(layer=np.zeros(len(areas), np.int32)),
+            fading=WORN.fading,
+            breaks=WORN.breaks,
+        )
         visible_areas(layer_arrays(alone), 0, 4000, areas)
         assert areas.sum() == pytest.approx(maps[layer], rel=5e-3)
 
@@ -413,25 +431,29 @@ def test_a_tile_repeats_in_both_directions(name: str) -> None:
 
 def test_equal_seeds_give_equal_layers_and_others_do_not() -> None:
     one, same, other = make_layers(WORN, 1), make_layers(WORN, 1), make_layers(WORN, 2)
-    for a, b in zip(one, same, strict=True):
+    for a, b in zip(one.features, same.features, strict=True):
         np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(one.angle, same.angle)
+    for name in ("cells", "cell_start", "cell_items", "fading", "breaks"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
     assert not np.array_equal(one.angle, other.angle)
-    assert one.centre[0, 0] != other.centre[0, 0]
+    assert one.features.centre[0, 0] != other.features.centre[0, 0]
 
 
 def test_layers_have_the_types_that_were_promised_and_are_sorted() -> None:
     layers = make_layers(WORN, 1)
-    count = len(layers.layer)
+    features = layers.features
+    count = len(features.layer)
     types = {
         "layer": np.int32, "centre": np.float32, "turn": np.float32, "half_length": np.float32,
         "half_width": np.float32, "curvature": np.float32, "strength": np.float32,
         "seed": np.uint32, "is_dig": np.bool_,
     }  # fmt: skip
     for name, dtype in types.items():
-        column = getattr(layers, name)
+        column = getattr(features, name)
         assert (column.dtype, len(column)) == (dtype, count)
-    assert (np.diff(layers.layer) >= 0).all()
-    assert ((layers.centre >= 0) & (layers.centre < 1)).all()
+    assert (np.diff(features.layer) >= 0).all()
+    assert ((features.centre >= 0) & (features.centre < 1)).all()
     assert ((layers.angle >= 0) & (layers.angle < math.pi)).all()
     assert len(layers.cell_start) == 3 * layers.cells**2 + 1
     assert layers.cell_start[-1] == len(layers.cell_items)
@@ -446,7 +468,7 @@ def test_scratches_stay_in_their_places_while_settings_are_tried() -> None:
     plain, worn = make_layers(replace(COARSE, threshold=0.1), 3), make_layers(
         replace(COARSE, curvature=0.5, fading=0.3, breaks=0.2, spread=0.3), 3
     )  # fmt: skip
-    np.testing.assert_array_equal(plain.centre, worn.centre)
+    np.testing.assert_array_equal(plain.features.centre, worn.features.centre)
     np.testing.assert_array_equal(plain.angle, worn.angle)
 
 

@@ -312,7 +312,7 @@ def test_a_part_of_the_incidences_has_the_counts_of_all() -> None:
 
 _SCRIPT = """
 import numba
-from tests.pipelines.glass_scratches import test_monte_carlo as here
+from tests.pipelines.glass_scratches.tables import test_monte_carlo as here
 numba.set_num_threads(int({threads}))
 assert numba.get_num_threads() == int({threads})
 print(here.digest())

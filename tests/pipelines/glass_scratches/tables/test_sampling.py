@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.bins import bin_centres, bin_weights
 from pipelines.glass_scratches.tables.profiles import built_in_profile
-from pipelines.glass_scratches.tables.sampling import Lobe, lobe_of, make_lobe
+from pipelines.glass_scratches.tables.sampling import Direction, Lobe, lobe_of, make_lobe
 from pipelines.glass_scratches.tables.scratch_table import scratch_table
 
 Floats = NDArray[np.float64]
@@ -45,37 +45,19 @@ def table(request: pytest.FixtureRequest) -> Lobe:
 
 
 @njit
-def _samples(
-    cdf: NDArray[np.float32],
-    sines: Floats,
-    blur: float,
-    place: int,
-    view: Floats,
-    numbers: Floats,
-    found: Floats,
-) -> None:
+def _samples(table: Lobe, place: int, view: Direction, numbers: Floats, found: Floats) -> None:
     for i in range(len(numbers)):
-        found[i] = sampling.sample(
-            cdf, sines, blur, place, view[0], view[1], view[2],
-            numbers[i, 0], numbers[i, 1], numbers[i, 2],
-        )  # fmt: skip
+        found[i] = sampling.sample(table, place, view, numbers[i, 0], numbers[i, 1], numbers[i, 2])
 
 
 @njit
 def _values(
-    rho: NDArray[np.float32],
-    share: NDArray[np.float32],
-    blur: float,
-    place: int,
-    view: Floats,
-    lights: Floats,
-    f: Floats,
-    density: Floats,
+    table: Lobe, place: int, view: Direction, lights: Floats, f: Floats, density: Floats
 ) -> None:
     for i in range(len(lights)):
-        a, b, c = lights[i, 0], lights[i, 1], lights[i, 2]
-        f[i] = sampling.evaluate(rho, blur, place, view[0], view[1], view[2], a, b, c)
-        density[i] = sampling.pdf(rho, share, blur, place, view[0], view[1], view[2], a, b, c)
+        light = Direction(lights[i, 0], lights[i, 1], lights[i, 2])
+        f[i] = sampling.evaluate(table, place, view, light)
+        density[i] = sampling.pdf(table, place, view, light)
 
 
 @njit
@@ -93,7 +75,7 @@ def direction(theta: Floats | float, phi: Floats | float) -> Floats:
 def values(table: Lobe, view: Floats, lights: Floats, place: int = PLACE) -> tuple[Floats, Floats]:
     flat = np.ascontiguousarray(lights.reshape(-1, 3))
     f, density = np.empty(len(flat)), np.empty(len(flat))
-    _values(table.rho, table.share, table.blur, place, view, flat, f, density)
+    _values(table, place, Direction(*view), flat, f, density)
     return f.reshape(lights.shape[:-1]), density.reshape(lights.shape[:-1])
 
 
@@ -122,7 +104,7 @@ def test_samples_fall_as_the_pdf_has_them(table: Lobe, view: tuple[float, float]
     rng = np.random.default_rng(2)
     found = np.empty((count, 3))
     o = direction(*view)
-    _samples(table.cdf, table.sines, table.blur, PLACE, o, rng.random((count, 3)), found)
+    _samples(table, PLACE, Direction(*o), rng.random((count, 3)), found)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-12)
     assert (found[:, 2] >= 0).all()
     phi = np.arctan2(found[:, 1], found[:, 2])
@@ -231,7 +213,7 @@ def test_a_mirror_turns_the_lean_over() -> None:
     numbers = np.random.default_rng(4).random((4000, 3))
     found = np.empty((4000, 3))
     view = direction(0.7, 0.2)
-    _samples(table.cdf, table.sines, table.blur, PLACE, view, numbers, found)
+    _samples(table, PLACE, Direction(*view), numbers, found)
     assert np.median(found[:, 0]) == pytest.approx(-math.sin(0.7), abs=2e-3)
     assert np.ptp(found[:, 0]) < 0.2
 

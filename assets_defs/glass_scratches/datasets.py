@@ -1,0 +1,217 @@
+"""Stored datasets of this system and the objects of `pipelines`, in both directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from pipelines.geometry.solids import Solid
+    from pipelines.glass_scratches.drawing.frames import GlassFrames, ScratchedGlass
+    from pipelines.glass_scratches.layers.features import Layers
+    from pipelines.glass_scratches.tables.sampling import Lobe
+    from pipelines.glass_scratches.tables.scratch_table import Lean, Table2D
+
+
+def table_2d_dataset(table: Table2D, method: str, roughness: float) -> xr.Dataset:
+    """`scratch_table_2d` of a table, and how it was made."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "rho": (("out", "in"), table.rho),
+            "standard_error": (("out", "in"), table.standard_error),
+            "absorbed": ("in", table.absorbed),
+            "across": (("place", "out", "in"), table.across),
+        },
+        attrs={"method": method, "roughness": roughness},
+    )
+
+
+def table_2d_of(dataset: xr.Dataset) -> Table2D:
+    """The table that a `scratch_table_2d` dataset holds."""
+    from pipelines.glass_scratches.tables.scratch_table import Table2D
+
+    return Table2D(*(dataset[name].values for name in Table2D._fields))
+
+
+def table_dataset(
+    rho: NDArray[np.float64], lean: Lean, lobe: Lobe, refractive_index: float
+) -> xr.Dataset:
+    """`scratch_table` of a table (M, M) with its lean along the scratch and its sampling."""
+    import numpy as np
+    import xarray as xr
+
+    from pipelines.glass_scratches.tables.scratch_table import LEANS
+
+    leaning = (lean.factor[:, :, None] * rho).astype(np.float32)
+    return xr.Dataset(
+        {
+            "rho_s": (("lean", "out", "in"), leaning),
+            "lean": ("lean", np.array(LEANS)),
+            "factor": (("lean", "out"), lean.factor),
+            "gamma": ("out", lean.gamma),
+            "cdf": (("place", "out", "border"), lobe.cdf),
+            "share": (("place", "out"), lobe.share),
+            "index": ((), refractive_index),
+        }
+    )
+
+
+def lean_of(scratch_table: xr.Dataset) -> Lean:
+    """The lean that a `scratch_table` dataset holds."""
+    from pipelines.glass_scratches.tables.scratch_table import Lean
+
+    return Lean(scratch_table["factor"].values, scratch_table["gamma"].values)
+
+
+def lobe_of(scratch_table_2d: xr.Dataset, scratch_table: xr.Dataset) -> Lobe:
+    """What sampling needs, of a `scratch_table` dataset and the one that it was made from."""
+    from pipelines.glass_scratches.tables import sampling
+
+    return sampling.lobe_of(
+        scratch_table_2d["across"].values,
+        scratch_table["cdf"].values,
+        scratch_table["share"].values,
+        scratch_table_2d.attrs["roughness"],
+    )
+
+
+def layers_dataset(
+    layers: Layers, coverage: NDArray[np.float32], stages: NDArray[np.uint8]
+) -> xr.Dataset:
+    """`scratch_layers`: the scratches, their maps (L, R, R), pictures of the stages of making."""
+    import xarray as xr
+
+    from pipelines.glass_scratches.layers.features import Features
+
+    return xr.Dataset(
+        {
+            "angle": ("layer", layers.angle),
+            **{
+                _feature_variable(name): (
+                    ("feature", "axis") if name == "centre" else "feature",
+                    getattr(layers.features, name),
+                )
+                for name in Features._fields
+            },
+            "coverage": (("layer", "y", "x"), coverage),
+            "stages": (("stage", "row", "column"), stages),
+        },
+        attrs={"fading": layers.fading, "breaks": layers.breaks},
+    )
+
+
+def layers_of(scratch_layers: xr.Dataset) -> Layers:
+    """The scratches of a `scratch_layers` dataset, with their search grid."""
+    from pipelines.glass_scratches.layers.features import Features, layers_of_features
+
+    features = (scratch_layers[_feature_variable(name)].values for name in Features._fields)
+    return layers_of_features(
+        scratch_layers["angle"].values,
+        Features(*features),
+        fading=scratch_layers.attrs["fading"],
+        breaks=scratch_layers.attrs["breaks"],
+    )
+
+
+def _feature_variable(name: str) -> str:
+    """The dataset's name of a feature's field: `layer` is a dimension there."""
+    return "feature_layer" if name == "layer" else name
+
+
+def solid_dataset(solid: Solid, name: str) -> xr.Dataset:
+    """`glass_object` of a solid that people know by this name."""
+    import xarray as xr
+
+    from pipelines.glass_scratches.figures import enclosed_volume
+
+    return xr.Dataset(
+        {
+            "vertices": (("vertex", "axis"), solid.vertices),
+            "triangles": (("triangle", "corner"), solid.triangles),
+            "corner_normals": (("triangle", "corner", "axis"), solid.corner_normals),
+            "volume": ((), enclosed_volume(solid.vertices, solid.triangles)),
+        },
+        attrs={"name": name},
+    )
+
+
+def solid_of(glass_object: xr.Dataset) -> Solid:
+    """The solid that a `glass_object` dataset holds."""
+    from pipelines.geometry.solids import Solid
+
+    return Solid(*(glass_object[name].values for name in Solid._fields))
+
+
+def scratched_glass_of(
+    scratch_table_2d: xr.Dataset,
+    scratch_table: xr.Dataset,
+    scratch_layers: xr.Dataset,
+    glass_object: xr.Dataset,
+    tile: float,
+) -> ScratchedGlass:
+    """The scratched solid, ready to be traced and to be drawn on the stage."""
+    from pipelines.glass_scratches.drawing.frames import ScratchedGlass
+    from pipelines.glass_scratches.drawing.path_tracing import make_surface
+    from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
+    from pipelines.glass_scratches.layers.features import layer_arrays
+
+    solid, lean = solid_of(glass_object), lean_of(scratch_table)
+    coverage = scratch_layers["coverage"].values
+    along = {"tile": tile, "index": float(scratch_table["index"])}
+    surface = make_surface(
+        layer_arrays(layers_of(scratch_layers)),
+        coverage,
+        lobe_of(scratch_table_2d, scratch_table),
+        lean,
+        roughness=scratch_table_2d.attrs["roughness"],
+        **along,
+    )
+    angles, rho = scratch_layers["angle"].values, scratch_table_2d["rho"].values
+    actor = ScratchedActor(solid, coverage, angles, rho, lean, **along)
+    return ScratchedGlass(solid, surface, actor)
+
+
+def frames_dataset(frames: GlassFrames) -> xr.Dataset:
+    """`glass_frames` of both views, the moving light and the furnace."""
+    import numpy as np
+    import xarray as xr
+
+    from pipelines.drawing.colour import to_8bit
+
+    traced = (frames.far, frames.close)
+    radiance = np.stack([picture.radiance for picture in traced])
+    pixels, furnace_pixels = ("view", "y", "x"), ("furnace_row", "furnace_column")
+    return xr.Dataset(
+        {
+            "radiance": ((*pixels, "channel"), radiance),
+            "error": (pixels, np.sqrt(np.stack([picture.variance for picture in traced]))),
+            "scratched": (pixels, np.stack([picture.scratched for picture in traced])),
+            "frames": ((*pixels, "channel"), to_8bit(radiance * frames.exposure)),
+            "stage": ((*pixels, "channel"), to_8bit(frames.stage * frames.exposure)),
+            "moving": (("light", "row", "column", "channel"), frames.moving),
+            "exposure": ((), frames.exposure),
+            "furnace": (furnace_pixels, frames.furnace.radiance.mean(axis=2)),
+            "furnace_error": (furnace_pixels, np.sqrt(frames.furnace.variance)),
+        }
+    )
+
+
+def _lobe(version: StoredVersion) -> Lobe:
+    return lobe_of(version.input("scratch_table_2d"), version.dataset)
+
+
+LOADERS: dict[str, Callable[[StoredVersion], object]] = {
+    "scratch_table_2d": lambda version: table_2d_of(version.dataset),
+    "scratch_table": _lobe,
+    "scratch_layers": lambda version: layers_of(version.dataset),
+    "glass_object": lambda version: solid_of(version.dataset),
+}
+"""What `tsuya.load` gives of an asset: Table2D, Lobe, Layers, Solid."""
