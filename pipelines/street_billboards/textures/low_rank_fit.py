@@ -27,6 +27,10 @@ FloatArray = NDArray[np.float32]
 RIDGE = 0.05
 """Codes², of images."""
 _PULL = 0.5
+_LANES = 16
+"""Sums side by side, which a processor adds in one go. With leave to reorder (fastmath), a kernel
+that was compiled in this process and the same one from numba's cache gave different last bits, so
+the same street was stored twice."""
 _START_SWEEPS = 3
 
 
@@ -73,7 +77,7 @@ def fit_low_rank(
     return factors
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def truncated_svd(values: FloatArray, counted: FloatArray, rank: int) -> Factors:
     """The truncated SVD, gaps filled with the mean of the other views.
 
@@ -100,10 +104,7 @@ def truncated_svd(values: FloatArray, counted: FloatArray, rank: int) -> Factors
         for p in range(texels):
             filled[i, p] = values[i, p] - means[i] if counted[i, p] > 0.0 else middle[p]
     for i in range(views):
-        own = np.float32(0.0)
-        for p in range(texels):
-            own += filled[i, p]
-        own /= texels
+        own = _total(filled[i]) / np.float32(texels)
         for p in range(texels):
             filled[i, p] -= own
         means[i] += own
@@ -127,17 +128,17 @@ def truncated_svd(values: FloatArray, counted: FloatArray, rank: int) -> Factors
     return Factors(means, weights, images)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def _centre(values: FloatArray, counted: FloatArray, middle: FloatArray, means: FloatArray) -> None:
     """Views' means beyond the texels' ``middle``; the mean of these for views that saw nothing."""
     views, texels = values.shape
     known = 0
     mean = np.float32(0.0)
+    off = np.empty(texels, np.float32)
     for i in range(views):
-        mass, moment = np.float32(0.0), np.float32(0.0)
         for p in range(texels):
-            mass += counted[i, p]
-            moment += counted[i, p] * (values[i, p] - middle[p])
+            off[p] = values[i, p] - middle[p]
+        mass, moment = _total(counted[i]), dot(counted[i], off)
         if mass > 0.0:
             means[i] = moment / mass
             mean += means[i]
@@ -149,16 +150,39 @@ def _centre(values: FloatArray, counted: FloatArray, middle: FloatArray, means: 
             means[i] = mean / known if known else np.float32(0.0)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def dot(one: FloatArray, other: FloatArray) -> np.float32:
-    """Sum of products of two vectors (P,)."""
+    """Sum of products of two vectors (P,), added up in a fixed order."""
+    sums = np.zeros(_LANES, np.float32)
+    whole = len(one) // _LANES * _LANES
+    for p in range(0, whole, _LANES):
+        for lane in range(_LANES):
+            sums[lane] += one[p + lane] * other[p + lane]
     total = np.float32(0.0)
-    for p in range(len(one)):
+    for lane in range(_LANES):
+        total += sums[lane]
+    for p in range(whole, len(one)):
         total += one[p] * other[p]
     return total
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
+def _total(values: FloatArray) -> np.float32:
+    """Sum of a vector (P,), added up in a fixed order."""
+    sums = np.zeros(_LANES, np.float32)
+    whole = len(values) // _LANES * _LANES
+    for p in range(0, whole, _LANES):
+        for lane in range(_LANES):
+            sums[lane] += values[p + lane]
+    total = np.float32(0.0)
+    for lane in range(_LANES):
+        total += sums[lane]
+    for p in range(whole, len(values)):
+        total += values[p]
+    return total
+
+
+@njit(cache=True, nogil=True)
 def _normalise(image: FloatArray, weights: FloatArray) -> None:
     size = np.float32(np.sqrt(dot(image, image) / len(image)))
     if size > 1e-6:
@@ -169,7 +193,7 @@ def _normalise(image: FloatArray, weights: FloatArray) -> None:
         weights[:] = 0.0
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def alternate_least_squares(
     values: FloatArray,
     counted: FloatArray,
@@ -194,7 +218,7 @@ def alternate_least_squares(
     _orthogonalise(counted, factors)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def solve_images(
     values: FloatArray,
     counted: FloatArray,
@@ -250,7 +274,7 @@ def solve_images(
             images[k, p] *= factor[k, k, p]
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def solve_weights(
     values: FloatArray,
     counted: FloatArray,
@@ -279,22 +303,18 @@ def solve_weights(
     mean_of_means, known = 0.0, 0
     empty = np.zeros(views, np.bool_)
     for i in range(views):
-        mass, moment = np.float32(0.0), np.float32(0.0)
         for p in range(texels):
             off[p] = values[i, p] - means[i]
-            mass += counted[i, p]
-            moment += counted[i, p] * off[p]
+        mass, moment = _total(counted[i]), dot(counted[i], off)
         if mass <= 0.0:
             empty[i] = True
             for k in range(rank):
                 weights[i, k] = centre[k]
             continue
         for k in range(rank):
-            sums = np.float32(0.0)
             for p in range(texels):
                 weighted[p] = images[k, p] * counted[i, p]
-                sums += weighted[p]
-            matrix[rank, k] = matrix[k, rank] = sums
+            matrix[rank, k] = matrix[k, rank] = _total(weighted)
             right[k] = dot(weighted, off) + pull[k] * centre[k]
             for m in range(k + 1):
                 matrix[k, m] = matrix[m, k] = dot(weighted, images[m])
@@ -315,7 +335,7 @@ def solve_weights(
                 means[i] = mean_of_means / known
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
     """The same sum, with centred orthogonal images, the strongest first, in place."""
     means, weights, images = factors
@@ -327,7 +347,7 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             if counted[i, p] > 0.0:
                 known[p] = 1.0
     for k in range(rank):
-        middle = dot(images[k], known) / max(known.sum(), np.float32(1.0))
+        middle = dot(images[k], known) / max(_total(known), np.float32(1.0))
         for p in range(texels):
             images[k, p] -= middle * known[p]
         for i in range(views):
@@ -357,7 +377,7 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             weights[i, k] = left[i, k] * lengths[k] / size
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def squared_error(
     values: FloatArray,
     counted: FloatArray,
@@ -367,6 +387,7 @@ def squared_error(
     means, weights, images = factors
     rank, texels = images.shape
     off = np.empty(texels, np.float32)
+    squares = np.empty(texels, np.float32)
     total = 0.0
     for i in range(len(values)):
         for p in range(texels):
@@ -375,8 +396,7 @@ def squared_error(
             weight = weights[i, k]
             for p in range(texels):
                 off[p] -= weight * images[k, p]
-        part = np.float32(0.0)
         for p in range(texels):
-            part += counted[i, p] * off[p] * off[p]
-        total += float(part)
+            squares[p] = off[p] * off[p]
+        total += float(dot(counted[i], squares))
     return total

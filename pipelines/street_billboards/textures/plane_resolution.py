@@ -33,7 +33,7 @@ def sample_places(side: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Floa
     return before, after, share
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def upsampled(planes: FloatArray, side: int) -> FloatArray:
     """Planes (r, side * side) as textures (r, 1024), float32."""
     count = len(planes)
@@ -54,7 +54,7 @@ def upsampled(planes: FloatArray, side: int) -> FloatArray:
     return result
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def upsampled_transpose(texture: FloatArray, side: int, plane: FloatArray) -> None:
     """The transpose of ``upsampled``, for one texture (1024,), into ``plane`` (side * side,)."""
     before, after, share = sample_places(side)
@@ -71,7 +71,7 @@ def upsampled_transpose(texture: FloatArray, side: int, plane: FloatArray) -> No
             plane[top + after[x]] += right - share[y] * right
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def downsampled(
     values: FloatArray, counted: FloatArray, side: int
 ) -> tuple[FloatArray, FloatArray]:
@@ -93,7 +93,7 @@ def downsampled(
     return small, mass
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def sharpen(
     values: FloatArray,
     counted: FloatArray,

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,3 +113,39 @@ def test_ranks_that_do_not_exist_are_refused() -> None:
     seen[1] = False
     with pytest.raises(ValueError, match="rank is 3; expected 0 to 2"):
         fit_low_rank(values, seen, 3)
+
+
+_FIT = """
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from pipelines.street_billboards.textures.low_rank_fit import fit_low_rank
+rng = np.random.default_rng(4)
+values = rng.random((9, 1024)).astype(np.float32) * 255
+seen = rng.random((9, 1024)) < 0.7
+found = hashlib.sha256()
+for rank in (1, 4, 7):
+    for array in fit_low_rank(values, seen, rank):
+        found.update(np.ascontiguousarray(array).tobytes())
+print(found.hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_a_kernel_from_the_cache_gives_the_same_bits(tmp_path: Path) -> None:
+    """The first process compiles, the second reads what it left."""
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", _FIT],
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    ]
+    assert said[0] == said[1]
