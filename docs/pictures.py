@@ -48,6 +48,8 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
     STREET: {"drive": ("city",)},
 }
 """Keys by dimension of what the pictures show."""
+GIVEN: dict[System, dict[str, int]] = {STREET: {"frames": 18}}
+"""Settings that differ from the demo's."""
 _HEIGHT = 400
 _GAP = 10
 
@@ -248,7 +250,8 @@ def make_assets() -> None:
 
     with open_session() as session:
         requests = [
-            Request(system, system.cross_product(keys), "demo") for system, keys in SHOWN.items()
+            Request(system, system.cross_product(keys), "demo", GIVEN.get(system, {}))
+            for system, keys in SHOWN.items()
         ]
         launched = launch_all(session, requests)
     report(session, launched, as_json=False)

@@ -81,7 +81,7 @@ SCRATCHES = System(
         Dimension(
             "setting",
             builtin=SETTINGS,
-            examples=SETTINGS,
+            examples=("setting-2", "mirror", "worn"),
             default="setting-2",
             suffixes=(".csv",),
             check=_check_profile,
@@ -89,7 +89,7 @@ SCRATCHES = System(
         Dimension(
             "object",
             builtin=OBJECTS,
-            examples=OBJECTS,
+            examples=("plate",),
             default="plate",
             suffixes=(".ply", ".obj", ".glb"),
             check=_check_object,

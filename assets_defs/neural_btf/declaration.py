@@ -49,7 +49,7 @@ BTF = System(
         Dimension(
             "material",
             builtin=tuple(MATERIALS),
-            examples=tuple(MATERIALS),
+            examples=("knit", "silk"),
             default="knit",
             suffixes=(".zip", ".btf"),
             folders=True,
@@ -58,7 +58,7 @@ BTF = System(
         Dimension(
             "clusters",
             builtin=(NONE, "100", "500", "1000", "2000"),
-            examples=(NONE, "100"),
+            examples=(NONE,),
             default=NONE,
             suffixes=(),
             numbers=True,

@@ -37,7 +37,7 @@ FUR = System(
         Dimension(
             "photo",
             builtin=(*BUILTIN_PHOTOGRAPHS, PELT),
-            examples=("grass", "chelsea", PELT),
+            examples=("grass", PELT),
             default=PELT,
             suffixes=(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr"),
             check=_check_photograph,
@@ -45,7 +45,7 @@ FUR = System(
         Dimension(
             "mesh",
             builtin=(SQUARE, "sphere", "teapot", "teapot-large"),
-            examples=(SQUARE, "teapot", "teapot-large"),
+            examples=("teapot",),
             default="teapot",
             suffixes=(".ply", ".obj", ".glb"),
             check=_check_mesh,

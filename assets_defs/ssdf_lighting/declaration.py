@@ -58,7 +58,7 @@ SSDF = System(
         Dimension(
             "scene",
             builtin=SCENES,
-            examples=SCENES,
+            examples=("teapot",),
             default="teapot",
             suffixes=(".ply", ".obj", ".glb"),
             check=_check_scene,

@@ -34,7 +34,7 @@ OFFSETS = (1.0, 2.0, 3.0)
 class DriveSettings(Settings):
     """The simulated drive; of a drive of yours, which part."""
 
-    frames: int = Field(18, ge=8, le=10_000, description="Built-in drive: frames")
+    frames: int = Field(12, ge=8, le=10_000, description="Built-in drive: frames")
     spacing: float = Field(3.0, gt=0, le=20, description="Built-in drive: metres between frames")
     width: int = Field(640, ge=160, le=4096, description="Built-in drive: pixels across, 8:5")
     view_angle: float = Field(75.0, ge=30, le=110, description="Built-in drive: degrees across")
