@@ -3,8 +3,9 @@ SHELL := /bin/sh
 VENV := .venv/bin
 SETUP := .venv/set-up
 NAME ?= fur
-# Tests run side by side; kernels of several threads would wait for each other.
-ONE_THREAD := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+# Tests run side by side; kernels of several threads would wait for each other. Libraries raise
+# the number of threads again by themselves: those that wait should sleep, not spin.
+ONE_THREAD := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE
 
 .PHONY: help setup demo test test-slow ui bench lint docs doctor
 

@@ -168,18 +168,8 @@ def dot(one: FloatArray, other: FloatArray) -> np.float32:
 
 @njit(cache=True, nogil=True)
 def _total(values: FloatArray) -> np.float32:
-    """Sum of a vector (P,), added up in a fixed order."""
-    sums = np.zeros(_LANES, np.float32)
-    whole = len(values) // _LANES * _LANES
-    for p in range(0, whole, _LANES):
-        for lane in range(_LANES):
-            sums[lane] += values[p + lane]
-    total = np.float32(0.0)
-    for lane in range(_LANES):
-        total += sums[lane]
-    for p in range(whole, len(values)):
-        total += values[p]
-    return total
+    """Sum of a vector (P,), in the same order."""
+    return dot(values, np.ones(len(values), np.float32))
 
 
 @njit(cache=True, nogil=True)
