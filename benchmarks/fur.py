@@ -24,7 +24,6 @@ from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
-from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
 from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
@@ -34,6 +33,7 @@ from pipelines.photo_fur.frames import (
 )
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh
+from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
 from pipelines.virtual.pelt.pelt import make_pelt
 from storage.readers.photographs import builtin_photograph
 
