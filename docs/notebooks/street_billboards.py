@@ -15,12 +15,12 @@ from pipelines.street_billboards.frames import draw_view
 from pipelines.street_billboards.whole_street import street_of_frames
 
 # %% [markdown]
-# A real pair, half its size: two cameras 19 cm apart that look along y, z is up.
+# A real pair, a third of its size: two cameras 19 cm apart that look along y, z is up.
 
 # %%
-photographs = np.stack(skimage.data.stereo_motorcycle()[:2])[:, ::2, ::2]
-lens = np.array([[497.5, 0, 185], [0, 497.5, 124.5], [0, 0, 1]])
-lenses = np.stack([lens - np.eye(3, k=2) * off for off in (29.4, 13.9)])
+photographs = np.stack(skimage.data.stereo_motorcycle()[:2])[:, ::3, ::3]
+lens = np.array([[331.7, 0, 123], [0, 331.7, 83], [0, 0, 1]])
+lenses = np.stack([lens - np.eye(3, k=2) * off for off in (19.3, 8.9)])
 pose = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 frame = RigFrame(photographs, lenses, np.stack([pose, moved_left(pose, -0.193)]))
 
@@ -29,5 +29,5 @@ frame = RigFrame(photographs, lenses, np.stack([pose, moved_left(pose, -0.193)])
 
 # %%
 street = street_of_frames([frame], voxel=0.12, nearest=1.5)
-plt.imshow(draw_view(street, lens, moved_left(pose, -0.3), (371, 250)))
+plt.imshow(draw_view(street, lens, moved_left(pose, -0.3), (247, 167)))
 plt.show()
