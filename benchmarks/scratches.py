@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches.drawing.frames import cameras
-from pipelines.glass_scratches.drawing.path_tracing import Strategy, Surface, make_surface, trace
+from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
+from pipelines.glass_scratches.drawing.path_tracing import Strategy, make_surface, trace
 from pipelines.glass_scratches.figures import block_means
 from pipelines.glass_scratches.layers.coverage import coverage_maps
 from pipelines.glass_scratches.layers.features import layer_arrays
@@ -125,7 +126,7 @@ def _interpolation() -> dict[str, float]:
     }
 
 
-def _setting_2() -> Surface:
+def _setting_2() -> ScratchedSurface:
     table = scratch_table(
         _v(),
         bins=BINS,

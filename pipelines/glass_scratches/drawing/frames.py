@@ -12,7 +12,8 @@ from pipelines.drawing.colour import luminance, to_8bit
 from pipelines.drawing.stage import Camera, fitting_distance, orbit
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.solids import Solid
-from pipelines.glass_scratches.drawing.path_tracing import Picture, Surface, trace
+from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
+from pipelines.glass_scratches.drawing.path_tracing import Picture, trace
 from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw_scratched
 from pipelines.light.built_in_environments import uniform
 from pipelines.light.environment_maps import rotate_environment, solid_angles
@@ -30,7 +31,7 @@ class ScratchedGlass(NamedTuple):
     """One scratched solid: its shape, its surface to be traced, and itself on the stage."""
 
     solid: Solid
-    surface: Surface
+    surface: ScratchedSurface
     actor: ScratchedActor
 
 
@@ -140,7 +141,7 @@ def trace_views(
     return (far, close), np.stack([picture[..., :3] for picture in stage])
 
 
-def furnace(solid: Solid, surface: Surface, seed: int) -> Picture:
+def furnace(solid: Solid, surface: ScratchedSurface, seed: int) -> Picture:
     """The far view in an environment of radiance 1: nowhere brighter than that."""
     return trace(
         solid,

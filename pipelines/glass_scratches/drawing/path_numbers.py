@@ -6,13 +6,26 @@ sequences", 2018), in an order and from an origin that are random for each pixel
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
 
+AXIS, CHOICE, DIRECTION, LIGHT, WALL, ROULETTE = range(6)
+"""Pairs of numbers that an event may use, by what they decide."""
 PAIRS = 6
-"""Pairs of numbers that an event may use."""
 _STRATIFIED = 4
 """Events of a path whose numbers are stratified."""
+
+
+class PathEvent(NamedTuple):
+    """Whose numbers: the pixel's ``seed``, the path's ``number``, ``samples`` of a pixel, and how
+    many events the path had before."""
+
+    seed: int
+    number: int
+    samples: int
+    depth: int
 
 
 @njit(cache=True, inline="always")
@@ -71,16 +84,17 @@ def jitter_pixels(pixels, samples, seed, jitter, seeds):  # type: ignore[no-unty
         )
         for sample in range(samples):
             number = row * samples + sample
-            jitter[number] = _pair(pixel_seed, sample, samples, 0)
+            jitter[number, 0], jitter[number, 1] = _pair(pixel_seed, sample, samples, 0)
             seeds[number] = pixel_seed
 
 
 @njit(cache=True)
-def path_numbers(seed, number, samples, depth, pair):  # type: ignore[no-untyped-def]
+def path_numbers(event, pair):  # type: ignore[no-untyped-def]
     """Two numbers for a path's event: stratified over the pixel's paths at first, then random."""
-    sample = number % samples
-    which = 1 + PAIRS * depth + pair
-    if depth < _STRATIFIED:
+    seed, samples = event.seed, event.samples
+    sample = event.number % samples
+    which = 1 + PAIRS * event.depth + pair
+    if event.depth < _STRATIFIED:
         return _pair(seed, sample, samples, which)
     h = mixed(seed + np.uint64(which * samples + sample + 1) * np.uint64(0x9E3779B97F4A7C15))
     return unit(mixed(h + np.uint64(1))), unit(mixed(h + np.uint64(2)))

@@ -31,15 +31,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.rays import build_scene, first_hits, occluded
-from pipelines.glass_scratches.drawing.path_events import (
-    DEEPEST,
-    Facing,
-    Outcome,
-    Paths,
-    Surface,
-    advance,
-)
+from pipelines.glass_scratches.drawing.path_events import DEEPEST, advance_paths
 from pipelines.glass_scratches.drawing.path_numbers import jitter_pixels
+from pipelines.glass_scratches.drawing.path_state import (
+    EventResults,
+    Faces,
+    Paths,
+    ScratchedSurface,
+    TracedGlass,
+)
 from pipelines.glass_scratches.layers.coverage import flatten_pyramid, pyramid
 from pipelines.glass_scratches.layers.feature_search import LayerArrays
 from pipelines.glass_scratches.tables.bins import bin_weights
@@ -48,6 +48,8 @@ from pipelines.glass_scratches.tables.scratch_table import Lean, check_index, in
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 if TYPE_CHECKING:
+    from open3d.t.geometry import RaycastingScene
+
     from pipelines.drawing.stage import Camera
     from pipelines.geometry.solids import Solid
 
@@ -77,7 +79,7 @@ def make_surface(
     roughness: float,
     tile: float,
     index: float,
-) -> Surface:
+) -> ScratchedSurface:
     """Put layers with their coverage (L, R, R), table and glass together.
 
     Raises ValueError for an index or tile that is not positive, and an R that is no power of two.
@@ -86,7 +88,7 @@ def make_surface(
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
     flat, offsets = flatten_pyramid(pyramid(coverage))
-    return Surface(
+    return ScratchedSurface(
         layers,
         flat,
         offsets,
@@ -110,7 +112,7 @@ def _mean_factor(lean: Lean) -> float:
 
 def trace(
     solid: Solid,
-    surface: Surface,
+    surface: ScratchedSurface,
     environment: EnvironmentSampler,
     camera: Camera,
     *,
@@ -127,14 +129,10 @@ def trace(
     sequence, shifted at random for each pixel). The result depends on the seed alone.
     """
     scene = build_scene(solid.vertices, solid.triangles)
-    corners = np.asarray(solid.vertices)[solid.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    normals /= areas[:, None]
-    shape = Facing(
-        normals.astype(np.float32), solid.corner_normals.astype(np.float32), _flats(normals, areas)
-    )
     size = float(np.linalg.norm(np.ptp(np.asarray(solid.vertices), axis=0)))
+    glass = TracedGlass(
+        _faces(solid), surface, environment, samples, _OFFSET * size, strategy == "uniform"
+    )
     view = _view(camera, width, height)
     pixels_a_block = max(1, _BLOCK // samples)
     total = width * height
@@ -145,16 +143,8 @@ def trace(
     for first in range(0, total, pixels_a_block):
         progress(first / total)
         pixels = np.arange(first, min(first + pixels_a_block, total))
-        gathered, met, cast = _trace_block(
-            scene,
-            shape,
-            surface,
-            environment,
-            _start(view, pixels, width, samples, seed),
-            samples,
-            _OFFSET * size,
-            strategy == "uniform",
-        )
+        paths = _start(view, pixels, width, samples, seed)
+        gathered, met, cast = _trace_block(scene, glass, paths)
         rays += cast
         parts = gathered.reshape(len(pixels), samples, 3)
         radiance[pixels] = parts.mean(axis=1)
@@ -164,6 +154,16 @@ def trace(
     grid = (height, width)
     return Picture(
         radiance.reshape(*grid, 3), variance.reshape(grid), scratched.reshape(grid), rays
+    )
+
+
+def _faces(solid: Solid) -> Faces:
+    corners = np.asarray(solid.vertices)[solid.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    normals /= areas[:, None]
+    return Faces(
+        normals.astype(np.float32), solid.corner_normals.astype(np.float32), _flats(normals, areas)
     )
 
 
@@ -240,40 +240,32 @@ def _start(view: _View, pixels: NDArray[np.int64], width: int, samples: int, see
     )
 
 
-def _trace_block(scene, shape, surface, environment, paths, samples, offset, uniform):  # type: ignore[no-untyped-def]
+def _trace_block(
+    scene: RaycastingScene, glass: TracedGlass, paths: Paths
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+    """Radiance (N, 3) of paths, whether they met a scratch (N,), and the rays that it took."""
     count = len(paths.number)
-    gathered = np.zeros((count, 3))
-    met = np.zeros(count, np.bool_)
+    radiance, met_scratch = np.zeros((count, 3)), np.zeros(count, np.bool_)
     rays = 0
     for depth in range(DEEPEST):
-        hits = first_hits(scene, paths.origin, paths.way)
+        hits = first_hits(scene, paths.origin, paths.direction)
         left = len(paths.number)
         rays += left
-        starts, towards, offered = (np.zeros((left, 3)) for _ in range(3))
         alive = np.zeros(left, np.bool_)
-        outcome = Outcome(gathered, met, alive, starts, towards, offered)
-        _in_threads(
-            left,
-            shape,
-            surface,
-            environment,
-            paths,
-            hits,
-            outcome,
-            depth,
-            samples,
-            offset,
-            uniform,
+        results = EventResults(
+            radiance, met_scratch, alive, *(np.zeros((left, 3)) for _ in range(3))
         )
-        asked = np.flatnonzero(offered.any(axis=1))
+        _in_threads(left, glass, paths, hits, depth, results)
+        asked = np.flatnonzero(results.shadow_radiance.any(axis=1))
         if len(asked):
             rays += len(asked)
-            lit = asked[~occluded(scene, starts[asked], towards[asked])]
-            gathered[paths.number[lit]] += offered[lit]
+            starts, towards = results.shadow_origin[asked], results.shadow_direction[asked]
+            lit = asked[~occluded(scene, starts, towards)]
+            radiance[paths.number[lit]] += results.shadow_radiance[lit]
         if not alive.any():
             break
-        paths = Paths(*(array[alive] for array in paths))
-    return gathered, met, rays
+        paths = Paths._make(array[alive] for array in paths)
+    return radiance, met_scratch, rays
 
 
 def _in_threads(count: int, *arguments: Any) -> None:
@@ -283,7 +275,7 @@ def _in_threads(count: int, *arguments: Any) -> None:
     borders = np.linspace(0, count, workers + 1).astype(np.int64)
     with ThreadPoolExecutor(workers) as threads:
         parts = [
-            threads.submit(advance, first, last, *arguments)
+            threads.submit(advance_paths, first, last, *arguments)
             for first, last in itertools.pairwise(borders)
         ]
         for part in parts:

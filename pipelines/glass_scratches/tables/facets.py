@@ -91,13 +91,13 @@ def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.hypot(step[..., 0], step[..., 1])
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _turn(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
     """Twice the area of a triangle: positive where c lies left of the line from a to b."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _leaves_inwards(ends, vertex, wx, wy, tolerance):  # type: ignore[no-untyped-def]
     """Whether a step (wx, wy) from a vertex of the profile goes into the scratch, or along it."""
     last = len(ends) - 1
@@ -116,7 +116,7 @@ def _leaves_inwards(ends, vertex, wx, wy, tolerance):  # type: ignore[no-untyped
     return left_of_next or left_of_before
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _blocked(profile, ax, ay, bx, by, tolerance):  # type: ignore[no-untyped-def]
     """Whether the line from a to b leaves the scratch between its ends: by properly crossing a
     piece of the profile, or through one of its points, where that is not just grazed."""

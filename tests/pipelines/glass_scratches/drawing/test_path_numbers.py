@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from pipelines.glass_scratches.drawing.path_numbers import PAIRS, path_numbers, permuted
+from pipelines.glass_scratches.drawing.path_numbers import PAIRS, PathEvent, path_numbers, permuted
 
 SEED = np.uint64(0x1234_5678_9ABC_DEF1)
 
@@ -32,7 +32,9 @@ def test_each_index_goes_everywhere_equally_often() -> None:
 
 
 def _numbers(samples: int, depth: int, pair: int) -> np.ndarray:
-    return np.array([path_numbers(SEED, n, samples, depth, pair) for n in range(samples)])
+    return np.array(
+        [path_numbers(PathEvent(SEED, n, samples, depth), pair) for n in range(samples)]
+    )
 
 
 @pytest.mark.parametrize("depth", [0, 3])

@@ -15,8 +15,10 @@ from pipelines.drawing.stage import Camera, orbit
 from pipelines.geometry.solid_shapes import glass_teapot, plate
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing import path_tracing
-from pipelines.glass_scratches.drawing.path_events import Surface, lean_factor, reflectance
+from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
 from pipelines.glass_scratches.drawing.path_tracing import Picture, Strategy, make_surface, trace
+from pipelines.glass_scratches.drawing.scratch_scattering import fresnel_factor
+from pipelines.glass_scratches.drawing.smooth_glass import reflectance
 from pipelines.glass_scratches.layers.coverage import coverage_maps
 from pipelines.glass_scratches.layers.feature_search import LayerArrays, scratch_at
 from pipelines.glass_scratches.layers.features import layer_arrays
@@ -55,7 +57,7 @@ def surface(
     resolution: int = 64,
     tile: float = 1.0,
     index: float = INDEX,
-) -> Surface:
+) -> ScratchedSurface:
     made = scratch_table(
         built_in_profile("v", 10.0, 4.0),
         bins=BINS,
@@ -93,7 +95,7 @@ def facing(degrees: float = 0.0, height: float = 0.5) -> Camera:
 
 def picture(
     solid: Solid,
-    made: Surface,
+    made: ScratchedSurface,
     light: EnvironmentSampler,
     camera: Camera,
     *,
@@ -296,10 +298,10 @@ def test_a_matt_plate_in_closed_form(pane: Solid, degrees: float, strategy: Stra
     way = np.array([math.sin(math.radians(degrees)), math.cos(math.radians(degrees))])
     angle = made.layers.angle.astype(np.float64)
     theta = np.arcsin(way[0] * np.cos(angle))
-    factor = np.mean([lean_factor(made, np.sin(t), 0.0, np.cos(t)) for t in theta])
+    factor = np.mean([fresnel_factor(made, (np.sin(t), 0.0, np.cos(t))) for t in theta])
     head_on, out = let_out(INDEX)
     np.testing.assert_allclose(head_on, 0.04, rtol=1e-9)
-    assert made.mean_factor == pytest.approx(1 - out * INDEX**2, rel=1e-3)
+    assert made.mean_fresnel == pytest.approx(1 - out * INDEX**2, rel=1e-3)
     behind = (1 - factor) / (2 - out)
     for side, expected in (("before", 1 - behind), ("behind", behind)):
         mean, error = block_means(found[side])
@@ -478,7 +480,7 @@ def test_progress_grows_to_one(pane: Solid) -> None:
 # ---- surfaces --------------------------------------------------------------------------------
 
 
-def with_fields(*, tile: float = 1.0, index: float = INDEX, side: int = 8) -> Surface:
+def with_fields(*, tile: float = 1.0, index: float = INDEX, side: int = 8) -> ScratchedSurface:
     layers = layer_arrays(make_layers(CLEAN, 1))
     return make_surface(
         layers,
@@ -511,9 +513,9 @@ def test_the_mean_factor_is_f_over_the_hemisphere(variant: Fresnel) -> None:
     view = np.clip(((phi / np.pi + 0.5) * 64).astype(int), 0, 63)
     factor = interpolated_factor(lean, theta)[np.arange(len(theta)), view]
     error = factor.std() / math.sqrt(len(factor))
-    assert made.mean_factor == pytest.approx(factor.mean(), abs=4.5 * error)
+    assert made.mean_fresnel == pytest.approx(factor.mean(), abs=4.5 * error)
     views = zip(u[:200], v[:200], np.sqrt(1 - radius[:200] ** 2), strict=True)
-    asked = [lean_factor(made, *each) for each in views]
+    asked = [fresnel_factor(made, each) for each in views]
     np.testing.assert_allclose(asked, factor[:200], rtol=1e-9)
 
 
