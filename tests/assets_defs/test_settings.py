@@ -239,14 +239,20 @@ def test_dagster_refuses_another_type_before_the_run(config: dict[str, Any]) -> 
     [plan.settings for system in SYSTEMS.values() for plan in system.plans.values()],
     ids=lambda settings: settings.__name__,
 )
-def test_the_settings_of_every_asset_go_through_dagster_and_back(settings: type[Settings]) -> None:
+@pytest.mark.parametrize(
+    "preset",
+    [
+        preset if preset == "paper" else pytest.param(preset, marks=pytest.mark.slow)
+        for preset in PRESETS
+    ],
+)
+def test_the_settings_of_every_asset_go_through_dagster_and_back(
+    settings: type[Settings], preset: Preset
+) -> None:
     keys = dict.fromkeys((d.name for s in SYSTEMS.values() for d in s.dimensions), "any")
-    for preset in PRESETS:
-        expected = settings.preset(preset, keys)
-        config = {
-            name: value
-            for name, value in expected.model_dump(mode="json").items()
-            if value is not None
-        }
-        seen = run_with(settings, config)
-        assert resolve(settings, "any", keys, preset=None, given=seen, current=None) == expected
+    expected = settings.preset(preset, keys)
+    config = {
+        name: value for name, value in expected.model_dump(mode="json").items() if value is not None
+    }
+    seen = run_with(settings, config)
+    assert resolve(settings, "any", keys, preset=None, given=seen, current=None) == expected

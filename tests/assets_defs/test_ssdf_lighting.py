@@ -91,6 +91,7 @@ def test_what_is_stored_is_loaded_as_the_systems_own_objects(good: Any) -> None:
     assert tsuya.load("ssdf_lighting/environment_lights/sky", store).axes.shape == (6, 3)
 
 
+@pytest.mark.slow
 def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:
     house = make_house()
     paper = {"coding": "paper", "values": 12, "space": "positions", "edges": "samples"}

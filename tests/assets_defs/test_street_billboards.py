@@ -92,6 +92,7 @@ def test_stored_streets_load_as_what_they_are_drawn_from(good: Any) -> None:
     assert load("view_textures").first[-1] == len(load("view_textures").colours)
 
 
+@pytest.mark.slow
 def test_the_papers_form_and_plain_sampling(make_house: Any, good: Any) -> None:
     occluded = views_of(_open(good, "view_textures"))
     given = {"sampling": "plain", "planes": "turning", "coding": "paper", "frames": 8}

@@ -160,7 +160,10 @@ def by_quadrature(view: Array, light: Array, sharpness: float, roughness: float)
     return float(np.sum(values * weights))
 
 
-@pytest.mark.parametrize("roughness", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize(
+    "roughness",
+    [0.1, pytest.param(0.25, marks=pytest.mark.slow), pytest.param(0.5, marks=pytest.mark.slow)],
+)
 @pytest.mark.parametrize(
     ("sharpness", "most"), [(0.5, 0.04), (5, 0.12), (30, 0.12), (300, 0.13), (1000, 0.22)]
 )
