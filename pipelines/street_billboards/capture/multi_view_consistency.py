@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 Map = NDArray[np.float32]
+Point = tuple[float, float, float]
 
 _SURE = 2.0
 """Standard deviations within which two depths are one."""
@@ -105,68 +106,71 @@ def geometric_consistency(
     than half as many look through it. Along its ray, a point lies at the mean of all that agree, by
     inverse variance.
     """
-    height, width = view.depth.shape
+    depth, deviation = view.depth, view.deviation
+    height, width = depth.shape
     rows, columns = (height + step - 1) // step, (width + step - 1) // step
     found = np.zeros((rows, columns, 3))
     normals = np.zeros((rows, columns, 3), np.float32)
     weight = np.zeros((rows, columns), np.float32)
-    ray = np.empty((2, 3))
     for row in range(rows):
         for column in range(columns):
             y, x = row * step, column * step
-            z = np.float64(view.depth[y, x])
+            z = np.float64(depth[y, x])
             if not z <= farthest:
                 continue
-            _set_ray(ray, view, x, y, z)
-            agree, through, moved, certain = _votes(
-                ray, np.float64(view.deviation[y, x]) ** 2, others
-            )
+            here, way = _ray(view, x, y, z)
+            variance = np.float64(deviation[y, x]) ** 2
+            agree, through, moved, certain = _votes(here, way, variance, others)
             if agree < least_support or 2 * through > agree:
                 continue
             moved /= certain
             for axis in range(3):
-                found[row, column, axis] = ray[0, axis] + ray[1, axis] * moved
+                found[row, column, axis] = here[axis] + way[axis] * moved
             weight[row, column] = 1 / (1 / certain + _LEAST_VARIANCE)
             _set_normal(normals[row, column], view, x, y)
     return found, normals, weight
 
 
 @njit(cache=True, nogil=True)
-def _set_ray(ray: FloatArray, view: DepthView, x: int, y: int, z: float) -> None:
-    """Rows of ``ray`` (2, 3): the pixel's point at depth z, and what a metre of depth adds."""
+def _ray(view: DepthView, x: int, y: int, z: float) -> tuple[Point, Point]:
+    """The pixel's point at depth z, and what a metre of depth adds to it."""
     lens, pose = view.lens, view.to_world
     across, down = (x - lens[2]) / lens[0], (y - lens[3]) / lens[1]
-    for i in range(3):
-        way = pose[i, 0] * across + pose[i, 1] * down + pose[i, 2]
-        ray[0, i], ray[1, i] = pose[i, 3] + way * z, way
+    way_x = pose[0, 0] * across + pose[0, 1] * down + pose[0, 2]
+    way_y = pose[1, 0] * across + pose[1, 1] * down + pose[1, 2]
+    way_z = pose[2, 0] * across + pose[2, 1] * down + pose[2, 2]
+    here = pose[0, 3] + way_x * z, pose[1, 3] + way_y * z, pose[2, 3] + way_z * z
+    return here, (way_x, way_y, way_z)
 
 
 @njit(cache=True, nogil=True)
 def _votes(
-    ray: FloatArray, variance: float, others: OtherDepthViews
+    here: Point, way: Point, variance: float, others: OtherDepthViews
 ) -> tuple[int, int, float, float]:
     """How many views have the point, and look through it; where those that have it put it.
 
     Along the ray, in metres of depth: the sum of offsets by inverse variance, and of these.
     """
-    here_x, here_y, here_z = ray[0, 0], ray[0, 1], ray[0, 2]
+    depths, deviations, lenses, from_world = others
+    here_x, here_y, here_z = here
+    way_x, way_y, way_z = way
     certain = 1 / variance
     moved = 0.0
     agree = through = 0
-    for k in range(len(others.depth)):
-        m = others.from_world[k]
+    for k in range(len(depths)):
+        m = from_world[k]
         seen_z = m[2, 0] * here_x + m[2, 1] * here_y + m[2, 2] * here_z + m[2, 3]
         if seen_z < _CLOSE:
             continue
         seen_x = m[0, 0] * here_x + m[0, 1] * here_y + m[0, 2] * here_z + m[0, 3]
         seen_y = m[1, 0] * here_x + m[1, 1] * here_y + m[1, 2] * here_z + m[1, 3]
-        u = seen_x / seen_z * others.lens[k, 0] + others.lens[k, 2]
-        v = seen_y / seen_z * others.lens[k, 1] + others.lens[k, 3]
+        u = seen_x / seen_z * lenses[k, 0] + lenses[k, 2]
+        v = seen_y / seen_z * lenses[k, 1] + lenses[k, 3]
         most = _MOST_APART * seen_z
-        measured, spread = _depth_at(others.depth[k], others.deviation[k], u, v, seen_z, most)
+        measured, spread = _depth_at(depths[k], deviations[k], u, v, seen_z, most)
         if np.isnan(measured):
             continue
-        slope = m[2, 0] * ray[1, 0] + m[2, 1] * ray[1, 1] + m[2, 2] * ray[1, 2]
+        slope = m[2, 0] * way_x + m[2, 1] * way_y + m[2, 2] * way_z
         apart = measured - seen_z
         unsure = np.sqrt(spread**2 + variance * slope**2)
         if abs(apart) <= min(_SURE * unsure + _FLOOR * seen_z, most):

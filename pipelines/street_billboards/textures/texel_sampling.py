@@ -19,6 +19,7 @@ from pipelines.street_billboards.textures.photographs import Photographs
 from pipelines.street_billboards.textures.texture_tables import EMPTY, SEEN, SIDE, UNSEEN
 
 FloatArray = NDArray[np.float64]
+Point = tuple[float, float, float]
 
 _SIGMAS = 3.0
 """Standard deviations of a depth that still agree with the surface."""
@@ -167,7 +168,18 @@ def _turned(
 
 
 @njit(cache=True, nogil=True)
-def _pixel(point: FloatArray, k: FloatArray, to_world: FloatArray) -> tuple[float, float, float]:
+def _point(billboard: _FacingCamera, s: float, t: float) -> Point:
+    """Where texture coordinates are in the world, m."""
+    centre, row, column = billboard.centre, billboard.row, billboard.column
+    return (
+        centre[0] + s * row[0] + t * column[0],
+        centre[1] + s * row[1] + t * column[1],
+        centre[2] + s * row[2] + t * column[2],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _pixel(point: Point, k: FloatArray, to_world: FloatArray) -> tuple[float, float, float]:
     ox, oy, oz = point[0] - to_world[0, 3], point[1] - to_world[1, 3], point[2] - to_world[2, 3]
     x = ox * to_world[0, 0] + oy * to_world[1, 0] + oz * to_world[2, 0]
     y = ox * to_world[0, 1] + oy * to_world[1, 1] + oz * to_world[2, 1]
@@ -184,7 +196,7 @@ def _state(
     """Whether a photograph shows the billboard's surface at a texel."""
     row, column, voxel = billboard.row, billboard.column, billboard.voxel
     depth, to_world = photograph.depth, photograph.to_world
-    point = billboard.centre + s * row + t * column
+    point = _point(billboard, s, t)
     across, down, z = _pixel(point, photograph.intrinsics, to_world)
     height, width = depth.shape
     x, y = math.floor(across + 0.5), math.floor(down + 0.5)
@@ -226,7 +238,7 @@ def _state(
 
 @njit(cache=True, nogil=True)
 def _steepness(
-    row: FloatArray, column: FloatArray, point: FloatArray, to_world: FloatArray, z: float
+    row: FloatArray, column: FloatArray, point: Point, to_world: FloatArray, z: float
 ) -> float:
     """Distance from the plane of what is a metre of depth from it, m."""
     nx = row[1] * column[2] - row[2] * column[1]
@@ -242,9 +254,7 @@ def _steepness(
 
 
 @njit(cache=True, nogil=True)
-def _through(
-    voxel: FloatArray, half: float, eye: FloatArray, point: FloatArray
-) -> tuple[float, float]:
+def _through(voxel: FloatArray, half: float, eye: FloatArray, point: Point) -> tuple[float, float]:
     """Where the ray from the eye enters and leaves the voxel; 1 is at the point."""
     enter, leave = 0.0, 1e9
     for axis in range(3):
@@ -269,7 +279,6 @@ def _colour(
     found: FloatArray,
 ) -> None:
     """Mean of bilinear samples of a photograph inside a texel, evened out, in codes."""
-    centre, row, column = billboard.centre, billboard.row, billboard.column
     pixels, codes = photograph.pixels, photograph.exposure_lut
     height, width = pixels.shape[:2]
     found[:] = 0.0
@@ -277,7 +286,7 @@ def _colour(
     for number in range(samples * samples):
         ds = (number % samples - 0.5 * (samples - 1)) * step
         dt = (number // samples - 0.5 * (samples - 1)) * step
-        point = centre + (s + ds) * row + (t + dt) * column
+        point = _point(billboard, s + ds, t + dt)
         across, down, _ = _pixel(point, photograph.intrinsics, photograph.to_world)
         across = min(max(across, 0.0), width - 1.0)
         down = min(max(down, 0.0), height - 1.0)
