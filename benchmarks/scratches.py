@@ -9,24 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.solid_shapes import plate
-from pipelines.glass_scratches.drawing.frames import cameras
-from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
-from pipelines.glass_scratches.drawing.path_tracing import Strategy, make_surface, trace
+from pipelines.glass_scratches.drawing.frames import object_cameras
+from pipelines.glass_scratches.drawing.path_tracing import (
+    Strategy,
+    trace_picture,
+)
 from pipelines.glass_scratches.figures import block_means
-from pipelines.glass_scratches.layers.coverage import coverage_maps
-from pipelines.glass_scratches.layers.features import layer_arrays
 from pipelines.glass_scratches.layers.scratch_layers import make_layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
-from pipelines.glass_scratches.tables.bins import bin_weights
-from pipelines.glass_scratches.tables.exact import exchange, leaving_share, solve
-from pipelines.glass_scratches.tables.monte_carlo import shoot
-from pipelines.glass_scratches.tables.profiles import Shape, built_in_profile
-from pipelines.glass_scratches.tables.sampling import make_lobe
-from pipelines.glass_scratches.tables.scratch_table import (
-    interpolation_error,
-    lean_factors,
-    scratch_table,
+from pipelines.glass_scratches.scratched_glass import (
+    ScratchedGlass,
+    scratch_material,
+    scratched_glass,
 )
+from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.fresnel import interpolation_error
+from pipelines.glass_scratches.tables.monte_carlo import shoot_paths
+from pipelines.glass_scratches.tables.profiles import Shape, built_in_profile
+from pipelines.glass_scratches.tables.radiosity import leaving_share, solve_radiosity, view_factors
+from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
 from pipelines.light.built_in_environments import lamps, sky
 from pipelines.light.environment_sampling import make_environment_sampler
 
@@ -59,7 +60,8 @@ def _laws() -> dict[str, float]:
     """White furnace and reciprocity, the worst of four profiles at albedo 1."""
     furnace, reciprocity = 0.0, 0.0
     for shape in SHAPES:
-        rho = solve(exchange(built_in_profile(shape, 10.0, 4.0), BINS, FACETS[1]), 1.0).rho
+        factors = view_factors(built_in_profile(shape, 10.0, 4.0), BINS, FACETS[1])
+        rho = solve_radiosity(factors, 1.0).rho
         furnace = max(furnace, float(np.abs(leaving_share(rho) - 1).max()))
         reciprocity = max(reciprocity, float(np.abs(rho - rho.T).max() / rho.max()))
     return {"white_furnace_error": furnace, "reciprocity_error": reciprocity}
@@ -67,9 +69,9 @@ def _laws() -> dict[str, float]:
 
 def _paths_against_exact() -> dict[str, float]:
     """z-scores of the Monte Carlo's counts, sigma from the exact probabilities."""
-    rho = solve(exchange(_v(), BINS, REFERENCE_FACETS), 1.0).rho
+    rho = solve_radiosity(view_factors(_v(), BINS, REFERENCE_FACETS), 1.0).rho
     chance = (rho * bin_weights(BINS)[:, None] / np.pi).T
-    counts = shoot(
+    counts = shoot_paths(
         _v(), bins=BINS, rays=PATHS_A_BIN, paths_per_ray=1, albedo=1.0, roughness=1.0, seed=1
     ).leaving.sum(axis=1)
     variance = PATHS_A_BIN * chance * (1 - chance)
@@ -90,7 +92,7 @@ def _table_speed() -> dict[str, Any]:
     errors = {}
     for facets in FACETS:
         coarse, fine = (
-            block_means(solve(exchange(_v(), BINS, count), 1.0).rho)
+            block_means(solve_radiosity(view_factors(_v(), BINS, count), 1.0).rho)
             for count in (facets, 4 * facets)
         )
         errors[facets] = float(np.abs(coarse / fine - 1).max())
@@ -99,10 +101,10 @@ def _table_speed() -> dict[str, Any]:
     exact = []
     for _ in range(7):
         started = time.perf_counter()
-        solve(exchange(_v(), BINS, facets), 1.0)
+        solve_radiosity(view_factors(_v(), BINS, facets), 1.0)
         exact.append(time.perf_counter() - started)
     started = time.perf_counter()
-    shoot(_v(), bins=BINS, rays=RAYS, paths_per_ray=PATHS, albedo=1.0, roughness=1.0, seed=2)
+    shoot_paths(_v(), bins=BINS, rays=RAYS, paths_per_ray=PATHS, albedo=1.0, roughness=1.0, seed=2)
     paths = time.perf_counter() - started
     seconds = float(np.median(exact))
     return {
@@ -126,41 +128,24 @@ def _interpolation() -> dict[str, float]:
     }
 
 
-def _setting_2() -> ScratchedSurface:
-    table = scratch_table(
-        _v(),
-        bins=BINS,
-        albedo=1.0,
-        roughness=1.0,
-        method="exact",
-        facets=FACETS[1],
-        rays=1,
-        paths_per_ray=1,
-        seed=0,
-    )
+def _setting_2() -> ScratchedGlass:
+    """The plate with the paper's second setting."""
+    table = scratch_brdf_table(_v(), bins=BINS, facets=FACETS[1])
     layers = make_layers(LayerSpec(length=0.6, width=0.01, threshold=0.1), 3)
-    return make_surface(
-        layer_arrays(layers),
-        coverage_maps(layers, 512),
-        make_lobe(table.across, 1.0),
-        lean_factors(BINS, 1.5, "paper"),
-        roughness=1.0,
-        tile=1.0,
-        index=1.5,
-    )
+    return scratched_glass(plate(1.5, 1.1, 0.05), scratch_material(table, layers))
 
 
 def _sampling() -> dict[str, float]:
     """Variance over the seeds of the pixels that show scratches, times the rays it took."""
-    solid, surface = plate(1.5, 1.1, 0.05), _setting_2()
+    glass = _setting_2()
     light = make_environment_sampler(sky(256, sun_azimuth=-115.0, sun_elevation=38.0))
-    camera = cameras(solid)[1]
+    camera = object_cameras(glass.solid)[1]
 
     def pictures(strategy: Strategy) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
         taken = [
-            trace(
-                solid,
-                surface,
+            trace_picture(
+                glass.solid,
+                glass.surface,
                 light,
                 camera,
                 width=VARIANCE_SIZE,
@@ -189,13 +174,13 @@ def _sampling() -> dict[str, float]:
 
 def _rendering() -> dict[str, float]:
     """The plate, setting 2, from far, among lamps."""
-    solid, surface = plate(1.5, 1.1, 0.05), _setting_2()
+    glass = _setting_2()
     light = make_environment_sampler(lamps(512))
-    camera = cameras(solid)[0]
+    camera = object_cameras(glass.solid)[0]
     started = time.perf_counter()
-    trace(
-        solid,
-        surface,
+    trace_picture(
+        glass.solid,
+        glass.surface,
         light,
         camera,
         width=RENDER_SIZE,

@@ -13,10 +13,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.geometry.solids import Solid
-    from pipelines.glass_scratches.drawing.frames import GlassFrames, ScratchedGlass
+    from pipelines.glass_scratches.drawing.frames import GlassFrames
     from pipelines.glass_scratches.layers.features import Layers
-    from pipelines.glass_scratches.tables.sampling import Lobe
-    from pipelines.glass_scratches.tables.scratch_table import Lean, Table2D
+    from pipelines.glass_scratches.scratched_glass import ScratchMaterial
+    from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+    from pipelines.glass_scratches.tables.lobe import Lobe
+    from pipelines.glass_scratches.tables.scratch_table import Table2D
 
 
 def table_2d_dataset(table: Table2D, method: str, roughness: float) -> xr.Dataset:
@@ -42,21 +44,21 @@ def table_2d_of(dataset: xr.Dataset) -> Table2D:
 
 
 def table_dataset(
-    rho: NDArray[np.float64], lean: Lean, lobe: Lobe, refractive_index: float
+    rho: NDArray[np.float64], fresnel: FresnelFactors, lobe: Lobe, refractive_index: float
 ) -> xr.Dataset:
-    """`scratch_table` of a table (M, M) with its lean along the scratch and its sampling."""
+    """`scratch_table` of a table (M, M) with F along the scratch and what sampling needs."""
     import numpy as np
     import xarray as xr
 
-    from pipelines.glass_scratches.tables.scratch_table import LEANS
+    from pipelines.glass_scratches.tables.fresnel import TABULATED_THETA
 
-    leaning = (lean.factor[:, :, None] * rho).astype(np.float32)
+    leaning = (fresnel.factor[:, :, None] * rho).astype(np.float32)
     return xr.Dataset(
         {
             "rho_s": (("lean", "out", "in"), leaning),
-            "lean": ("lean", np.array(LEANS)),
-            "factor": (("lean", "out"), lean.factor),
-            "gamma": ("out", lean.gamma),
+            "lean": ("lean", np.array(TABULATED_THETA)),
+            "factor": (("lean", "out"), fresnel.factor),
+            "gamma": ("out", fresnel.gamma),
             "cdf": (("place", "out", "border"), lobe.cdf),
             "share": (("place", "out"), lobe.share),
             "index": ((), refractive_index),
@@ -64,18 +66,18 @@ def table_dataset(
     )
 
 
-def lean_of(scratch_table: xr.Dataset) -> Lean:
-    """The lean that a `scratch_table` dataset holds."""
-    from pipelines.glass_scratches.tables.scratch_table import Lean
+def fresnel_of(scratch_table: xr.Dataset) -> FresnelFactors:
+    """F as a `scratch_table` dataset holds it."""
+    from pipelines.glass_scratches.tables.fresnel import FresnelFactors
 
-    return Lean(scratch_table["factor"].values, scratch_table["gamma"].values)
+    return FresnelFactors(scratch_table["factor"].values, scratch_table["gamma"].values)
 
 
 def lobe_of(scratch_table_2d: xr.Dataset, scratch_table: xr.Dataset) -> Lobe:
     """What sampling needs, of a `scratch_table` dataset and the one that it was made from."""
-    from pipelines.glass_scratches.tables import sampling
+    from pipelines.glass_scratches.tables.lobe import lobe_from_sums
 
-    return sampling.lobe_of(
+    return lobe_from_sums(
         scratch_table_2d["across"].values,
         scratch_table["cdf"].values,
         scratch_table["share"].values,
@@ -150,33 +152,21 @@ def solid_of(glass_object: xr.Dataset) -> Solid:
     return Solid(*(glass_object[name].values for name in Solid._fields))
 
 
-def scratched_glass_of(
-    scratch_table_2d: xr.Dataset,
-    scratch_table: xr.Dataset,
-    scratch_layers: xr.Dataset,
-    glass_object: xr.Dataset,
-    tile: float,
-) -> ScratchedGlass:
-    """The scratched solid, ready to be traced and to be drawn on the stage."""
-    from pipelines.glass_scratches.drawing.frames import ScratchedGlass
-    from pipelines.glass_scratches.drawing.path_tracing import make_surface
-    from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
-    from pipelines.glass_scratches.layers.features import layer_arrays
+def material_of(
+    scratch_table_2d: xr.Dataset, scratch_table: xr.Dataset, scratch_layers: xr.Dataset
+) -> ScratchMaterial:
+    """What lies on the glass, of the datasets of its table, of that along it, of its layers."""
+    from pipelines.glass_scratches.scratched_glass import ScratchMaterial
 
-    solid, lean = solid_of(glass_object), lean_of(scratch_table)
-    coverage = scratch_layers["coverage"].values
-    along = {"tile": tile, "index": float(scratch_table["index"])}
-    surface = make_surface(
-        layer_arrays(layers_of(scratch_layers)),
-        coverage,
+    return ScratchMaterial(
+        layers_of(scratch_layers),
+        scratch_layers["coverage"].values,
+        scratch_table_2d["rho"].values,
         lobe_of(scratch_table_2d, scratch_table),
-        lean,
-        roughness=scratch_table_2d.attrs["roughness"],
-        **along,
+        fresnel_of(scratch_table),
+        scratch_table_2d.attrs["roughness"],
+        float(scratch_table["index"]),
     )
-    angles, rho = scratch_layers["angle"].values, scratch_table_2d["rho"].values
-    actor = ScratchedActor(solid, coverage, angles, rho, lean, **along)
-    return ScratchedGlass(solid, surface, actor)
 
 
 def frames_dataset(frames: GlassFrames) -> xr.Dataset:

@@ -283,12 +283,13 @@ def glass_frames(
     glass_object: xr.Dataset,
 ) -> Result:
     """Trace the far and the close view, draw the same on the stage, and let the light go around."""
-    from assets_defs.glass_scratches.datasets import frames_dataset, scratched_glass_of
+    from assets_defs.glass_scratches.datasets import frames_dataset, material_of, solid_of
     from pipelines.glass_scratches.drawing.frames import draw_frames
+    from pipelines.glass_scratches.scratched_glass import scratched_glass
     from pipelines.light.environment_sampling import make_environment_sampler
 
-    tables = (scratch_table_2d, scratch_table)
-    glass = scratched_glass_of(*tables, scratch_layers, glass_object, settings.tile)
+    material = material_of(scratch_table_2d, scratch_table, scratch_layers)
+    glass = scratched_glass(solid_of(glass_object), material, tile=settings.tile)
     frames = draw_frames(
         glass,
         make_environment_sampler(environment(settings)),

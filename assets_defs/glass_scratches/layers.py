@@ -136,14 +136,14 @@ def _map_z(version: StoredVersion) -> float:
 def scratch_layers(settings: LayerSettings) -> Result:
     """Scatter the scratches and map their coverage."""
     from assets_defs.glass_scratches.datasets import layers_dataset
-    from pipelines.glass_scratches.layers.pictures import stages
     from pipelines.glass_scratches.layers.coverage import coverage_maps
+    from pipelines.glass_scratches.layers.pictures import layer_stages
     from pipelines.glass_scratches.layers.scratch_layers import make_layers
 
     spec = layer_spec(settings)
     layers = make_layers(spec, settings.layer_seed)
     maps = coverage_maps(layers, settings.resolution, MAP_SAMPLES)
-    dataset = layers_dataset(layers, maps, stages(spec, settings.layer_seed, _STAGE_SIZE))
+    dataset = layers_dataset(layers, maps, layer_stages(spec, settings.layer_seed, _STAGE_SIZE))
     return dataset, {
         "scratches": len(layers.features.layer),
         "bytes of the scratches": layers.angle.nbytes + sum(f.nbytes for f in layers.features),

@@ -131,11 +131,11 @@ class TableSettings(Settings):
 
 @SCRATCHES.before_work
 def _method_suits_walls(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    from pipelines.glass_scratches.tables.scratch_table import check_method
+    from pipelines.glass_scratches.tables.scratch_table import table_method
 
     walls = settings.get("scratch_table_2d")
     if isinstance(walls, TableSettings):
-        check_method(walls.method, walls.roughness)
+        table_method(walls.method, walls.roughness)
 
 
 def _table_pictures(dataset: xr.Dataset) -> Pictures:
@@ -213,11 +213,11 @@ def _across_error(version: StoredVersion) -> float:
 def scratch_table_2d(settings: TableSettings, scratch_profile: xr.Dataset) -> Result:
     """Solve for the table, or shoot paths."""
     from assets_defs.glass_scratches.datasets import table_2d_dataset
-    from pipelines.glass_scratches.tables.exact import leaving_share
-    from pipelines.glass_scratches.tables.scratch_table import scratch_table as make_table
+    from pipelines.glass_scratches.tables.radiosity import leaving_share
+    from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table, table_method
 
-    method = settings.method or ("exact" if settings.roughness == 1.0 else "paths")
-    table = make_table(
+    method = table_method(settings.method, settings.roughness)
+    table = scratch_brdf_table(
         scratch_profile["points"].values,
         bins=settings.bins,
         albedo=settings.albedo,
@@ -235,7 +235,7 @@ def scratch_table_2d(settings: TableSettings, scratch_profile: xr.Dataset) -> Re
 # ---- scratch_table ---------------------------------------------------------------------------
 
 
-class LeanSettings(Settings):
+class GlassSettings(Settings):
     """The glass, and how Fresnel's factor goes along the scratch."""
 
     refractive_index: float = Field(
@@ -248,9 +248,9 @@ class LeanSettings(Settings):
 
 
 def _spatial_pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.glass_scratches.drawing.pictures import lean_picture
+    from pipelines.glass_scratches.drawing.pictures import fresnel_picture
 
-    return {"leans": lean_picture(dataset["factor"].values, dataset["gamma"].values)}
+    return {"leans": fresnel_picture(dataset["factor"].values, dataset["gamma"].values)}
 
 
 def _sampler_p(version: StoredVersion) -> float:
@@ -261,7 +261,7 @@ def _sampler_p(version: StoredVersion) -> float:
 
 
 def _interpolation_error(version: StoredVersion) -> float:
-    from pipelines.glass_scratches.tables.scratch_table import interpolation_error
+    from pipelines.glass_scratches.tables.fresnel import interpolation_error
 
     settings = version.record["settings"]
     bins = version.dataset.sizes["out"]
@@ -276,7 +276,7 @@ def _largest_share(version: StoredVersion) -> float:
 @SCRATCHES.asset(
     schemas.SCRATCH_TABLE,
     by=("setting",),
-    settings=LeanSettings,
+    settings=GlassSettings,
     inputs=("scratch_table_2d",),
     pictures=_spatial_pictures,
     checks=(
@@ -302,14 +302,14 @@ def _largest_share(version: StoredVersion) -> float:
         ),
     ),
 )
-def scratch_table(settings: LeanSettings, scratch_table_2d: xr.Dataset) -> Result:
-    """Add the lean along the scratch, and what sampling needs."""
+def scratch_table(settings: GlassSettings, scratch_table_2d: xr.Dataset) -> Result:
+    """Add Fresnel's factor along the scratch, and what sampling needs."""
     from assets_defs.glass_scratches.datasets import table_dataset
-    from pipelines.glass_scratches.tables.sampling import make_lobe
-    from pipelines.glass_scratches.tables.scratch_table import lean_factors
+    from pipelines.glass_scratches.tables.fresnel import fresnel_factors
+    from pipelines.glass_scratches.tables.lobe import make_lobe
 
     rho = scratch_table_2d["rho"].values
-    lean = lean_factors(len(rho), settings.refractive_index, settings.fresnel)
+    fresnel = fresnel_factors(len(rho), settings.refractive_index, settings.fresnel)
     lobe = make_lobe(scratch_table_2d["across"].values, scratch_table_2d.attrs["roughness"])
-    dataset = table_dataset(rho, lean, lobe, settings.refractive_index)
-    return dataset, {"gamma, straight on": float(lean.gamma[len(rho) // 2])}
+    dataset = table_dataset(rho, fresnel, lobe, settings.refractive_index)
+    return dataset, {"gamma, straight on": float(fresnel.gamma[len(rho) // 2])}

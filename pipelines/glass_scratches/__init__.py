@@ -1,1 +1,18 @@
-"""Scratches on glass (docs/scratches.md): arrays in, arrays out."""
+"""Scratches on glass, from a cross-section to pictures (docs/scratches.md).
+
+Sections and equations named in this package are those of the paper that the page cites. In the
+order of the method:
+
+1. ``tables``: a cross-section (``profiles``); its 2-D scratch BRDF table (``scratch_table``),
+   exactly for diffuse walls (``facets``, ``radiosity``) or by paths for any (``monte_carlo``);
+   Fresnel's factor along the scratch (``fresnel``); the BRDF in space and its sampling
+   (``lobe``, ``sampling``).
+2. ``layers``: scratches in a tile that repeats (``settings``, ``scratch_layers``,
+   ``features``), how much they cover (``coverage``), the one at a point (``feature_search``).
+3. ``scratched_glass``: both together, and a solid with them on it.
+4. ``drawing``: the solid by path tracing (``path_tracing``: ``scratch_lookup``, ``smooth_glass``,
+   ``scratch_scattering``), by a shader on the stage (``stage_view``), and in the system's views
+   (``frames``).
+
+``figures`` tells whether results are right.
+"""

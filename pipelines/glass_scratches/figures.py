@@ -1,4 +1,4 @@
-"""Figures that tables, layers and samplers are judged by."""
+"""Figures that profiles, tables, samplers, layers, solids and pictures are judged by."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from pipelines.glass_scratches.layers.features import Layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.bins import bin_weights
-from pipelines.glass_scratches.tables.exact import leaving_share
-from pipelines.glass_scratches.tables.monte_carlo import shoot
-from pipelines.glass_scratches.tables.sampling import Direction, Lobe
+from pipelines.glass_scratches.tables.lobe import Direction, Lobe
+from pipelines.glass_scratches.tables.monte_carlo import shoot_paths
+from pipelines.glass_scratches.tables.radiosity import leaving_share
 
 BLOCKS = 16
 _INCIDENCES, _PATHS = 16, 20_000
 
 
 def block_means(rho: NDArray[np.float64], blocks: int = BLOCKS) -> NDArray[np.float64]:
-    """The table (M, M) averaged over blocks x blocks blocks of bins, weighted by the cosines."""
+    """The table (M, M) averaged over blocks x blocks blocks of bins, weighted by the cosines.
+
+    >>> block_means(np.ones((32, 32)), 4).shape
+    (4, 4)
+    """
     weight = bin_weights(len(rho))
     size = len(rho) // blocks
     shape = (blocks, size, blocks, size)
@@ -64,7 +68,7 @@ def paths_z_rms(
     """
     bins = len(rho)
     chosen = np.unique(np.linspace(0, bins - 1, _INCIDENCES).round().astype(np.int64))
-    counts = shoot(
+    counts = shoot_paths(
         profile,
         bins=bins,
         rays=_PATHS,
@@ -86,7 +90,7 @@ def paths_z_rms(
 
 
 def sampler_p_value(lobe: Lobe, samples: int = 40_000) -> float:
-    """p-value of a chi-square test: sampled lights in cells of (phi, lean) against the density.
+    """p-value of a chi-square test: sampled lights in cells of (phi, theta) against the density.
 
     For a few views and places across the opening; the least p-value times their number.
     """
@@ -95,8 +99,8 @@ def sampler_p_value(lobe: Lobe, samples: int = 40_000) -> float:
     views = ((0.0, 0.0), (0.4, 0.9), (-0.7, -0.5))
     columns, rows = min(16, lobe.rho.shape[1] // 2), 12
     least, tested = 1.0, 0
-    for number, (lean, angle) in enumerate(views):
-        view = Direction(np.sin(lean), np.cos(lean) * np.sin(angle), np.cos(lean) * np.cos(angle))
+    for number, (theta, phi) in enumerate(views):
+        view = Direction(np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi))
         for place in (1, len(lobe.rho) // 2):
             u = np.random.default_rng(number).random((samples, 3))
             found = np.zeros((rows, columns))
@@ -220,8 +224,8 @@ def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
     rows, columns = found.shape
     for i in range(len(u)):
         a, v, n = sampling.sample(lobe, place, view, u[i, 0], u[i, 1], u[i, 2])
-        row = min(int(sampling.quantile(a) * rows), rows - 1)
-        found[row, sampling.bin_of(v, n, columns)] += 1.0
+        row = min(int(sampling.theta_quantile(a) * rows), rows - 1)
+        found[row, sampling.phi_bin(v, n, columns)] += 1.0
 
 
 @njit(cache=True)
@@ -233,7 +237,7 @@ def _expected(lobe, place, view, rows, columns):  # type: ignore[no-untyped-def]
     fine, steps = 64, 8
     for row in range(rows):
         for strip in range(fine):
-            along = sampling.lean_sine((row + (strip + 0.5) / fine) / rows)
+            along = sampling.sine_of_quantile((row + (strip + 0.5) / fine) / rows)
             rest2 = 1.0 - along * along
             for column in range(bins):
                 low, high = lobe.sines[column], lobe.sines[column + 1]

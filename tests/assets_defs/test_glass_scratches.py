@@ -16,10 +16,11 @@ from assets_defs.sources import Source
 from pipelines.drawing import colour
 from pipelines.geometry import solid_shapes
 from pipelines.glass_scratches.drawing import frames
-from pipelines.glass_scratches.layers import scratch_layers as layers
-from pipelines.glass_scratches.tables import profiles, sampling
+from pipelines.glass_scratches.layers import coverage, features, scratch_layers
+from pipelines.glass_scratches.tables import fresnel, profiles
+from pipelines.glass_scratches.tables import lobe as lobes
 from pipelines.glass_scratches.tables import scratch_table as tables
-from pipelines.glass_scratches.tables.exact import equation_1, leaving_share
+from pipelines.glass_scratches.tables.radiosity import equation_1, leaving_share
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SETTING = {"setting": "setting-2"}
@@ -164,15 +165,14 @@ def _generous_sampler(right: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def _other_exponent(right: Callable[..., Any], *arguments: Any) -> Any:
-    lean = right(*arguments)
-    return lean._replace(gamma=lean.gamma * 0.8)
+    factors = right(*arguments)
+    return factors._replace(gamma=factors.gamma * 0.8)
 
 
 def _wide_scratches(right: Callable[..., Any], *arguments: Any) -> Any:
     made = right(*arguments)
-    fields = made._asdict() | {"half_width": made.half_width * np.float32(2.0)}
-    kept = {name: fields[name] for name in made._fields[:10]}
-    return layers.join_features(**kept)
+    wide = made.features._replace(half_width=made.features.half_width * np.float32(2.0))
+    return features.layers_of_features(made.angle, wide)
 
 
 def _moved_map(right: Callable[..., Any], *arguments: Any) -> Any:
@@ -211,9 +211,9 @@ def _furnace_times(factor: float) -> Callable[..., Any]:
 REGRESSIONS = (
     Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
     Regression("opening_tilt", profiles, "cut_profile", _raised, SETTING),
-    Regression("furnace_error", tables, "solve", _brighter_table, SETTING),
-    Regression("reciprocity_error", tables, "solve", _one_sided, SETTING),
-    Regression("paths_z_rms", tables, "exchange", _other_profile, SETTING),
+    Regression("furnace_error", tables, "solve_radiosity", _brighter_table, SETTING),
+    Regression("reciprocity_error", tables, "solve_radiosity", _one_sided, SETTING),
+    Regression("paths_z_rms", tables, "view_factors", _other_profile, SETTING),
     Regression(
         "across_error",
         tables,
@@ -221,17 +221,17 @@ REGRESSIONS = (
         lambda right, *arguments: right(*arguments) * np.float32(1.001),
         SETTING,
     ),
-    Regression("sampler_p", sampling, "make_lobe", _skewed_sampler, SETTING),
-    Regression("interpolation_error", tables, "lean_factors", _other_exponent, SETTING),
-    Regression("largest_share", sampling, "make_lobe", _generous_sampler, SETTING),
-    Regression("coverage_error", layers, "make_layers", _wide_scratches, SETTING),
-    Regression("map_z", layers, "coverage_maps", _moved_map, SETTING),
+    Regression("sampler_p", lobes, "make_lobe", _skewed_sampler, SETTING),
+    Regression("interpolation_error", fresnel, "fresnel_factors", _other_exponent, SETTING),
+    Regression("largest_share", lobes, "make_lobe", _generous_sampler, SETTING),
+    Regression("coverage_error", scratch_layers, "make_layers", _wide_scratches, SETTING),
+    Regression("map_z", coverage, "coverage_maps", _moved_map, SETTING),
     Regression("edge_error", solid_shapes, "plate", _holed, PLATE),
     Regression("volume", solid_shapes, "plate", _smaller, PLATE),
-    Regression("not_finite", frames, "trace", _negative_pixel, KEYS),
-    Regression("furnace_excess", frames, "furnace", _furnace_times(1.1), KEYS),
-    Regression("furnace_loss", frames, "furnace", _furnace_times(0.9), KEYS),
-    Regression("scratched_share", frames, "trace", _unscratched, KEYS),
+    Regression("not_finite", frames, "trace_picture", _negative_pixel, KEYS),
+    Regression("furnace_excess", frames, "trace_furnace", _furnace_times(1.1), KEYS),
+    Regression("furnace_loss", frames, "trace_furnace", _furnace_times(0.9), KEYS),
+    Regression("scratched_share", frames, "trace_picture", _unscratched, KEYS),
     Regression(
         "mean_brightness",
         colour,
@@ -242,7 +242,7 @@ REGRESSIONS = (
     Regression(
         "stage_brightness",
         frames,
-        "draw",
+        "draw_scratched",
         lambda right, *arguments, **options: right(*arguments, **options) * np.float32(0.05),
         KEYS,
     ),

@@ -13,7 +13,7 @@ from assets_defs.photo_fur.datasets import LOADERS
 from assets_defs.photo_fur.graph import FUR
 from pipelines.geometry import shapes
 from pipelines.geometry.meshes import Mesh
-from pipelines.photo_fur import attenuation, drawing, frames, photograph, shells
+from pipelines.photo_fur import attenuation, frames, photograph, shells, stage_view
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
 from storage.stored_version import StoredVersion
@@ -173,8 +173,8 @@ REGRESSIONS = (
         KEYS,
     ),
     Regression("texture_stretch", shapes, "teapot", _stretched_teapot, PELT_KEYS),
-    Regression("top_view_rmse", drawing, "depth_code", _half_dropped, KEYS),
-    Regression("least_coverage", drawing, "depth_code", _dropped, KEYS),
+    Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
+    Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),
     Regression(
         "mean_brightness", frames, "to_8bit", lambda right, picture: right(picture * 0.8), KEYS
     ),

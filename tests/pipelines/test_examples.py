@@ -31,7 +31,8 @@ def test_there_is_a_page_for_every_system() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_is_short_and_uses_numerics_only(page: Path) -> None:
     text = page.read_text()
-    lines = [line.strip() for line in text.splitlines()]
+    said = str(ast.get_docstring(ast.parse(text), clean=False))
+    lines = [line.strip() for line in text.replace(f'"""{said}"""', "").splitlines()]
     assert sum(1 for line in lines if line and not line.startswith("#")) <= MOST_LINES
     imported = {
         (node.module if isinstance(node, ast.ImportFrom) else node.names[0].name).partition(".")[0]

@@ -4,7 +4,7 @@ Nothing here knows the two dimensions of the table. Long walls with a diffuse ma
 space, u along the groove, v across and n upwards; a directional light shines on them, and what is
 seen through the opening from another direction, averaged over it, is measured. Divided by the light
 that the opening receives, that is the BRDF f = 2 rho_m / pi² which
-:mod:`pipelines.glass_scratches.tables.exact` promises for all leans.
+:mod:`pipelines.glass_scratches.tables.radiosity` promises for all leans.
 
 Directions are pairs (theta, phi), radians: phi from n towards v in the cross-section, theta from
 there towards u. A pair of directions is ``[light, view]``.
@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_centres
-from pipelines.glass_scratches.tables.exact import exchange, solve
 from pipelines.glass_scratches.tables.profiles import built_in_profile
+from pipelines.glass_scratches.tables.radiosity import solve_radiosity, view_factors
 
 WIDTH, DEPTH, ALBEDO = 10.0, 4.0, 0.8
 WIDEST = np.radians(75.0)
@@ -57,7 +57,7 @@ def table_brdf(
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    rho = solve(exchange(profile, bins, facets), albedo).rho
+    rho = solve_radiosity(view_factors(profile, bins, facets), albedo).rho
     middles = bin_centres(bins)
     # Rows are the view's bins, columns the light's.
     between = RegularGridInterpolator((middles, middles), rho)

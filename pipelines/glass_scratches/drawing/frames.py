@@ -12,9 +12,9 @@ from pipelines.drawing.colour import luminance, to_8bit
 from pipelines.drawing.stage import Camera, fitting_distance, orbit
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.solids import Solid
-from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
-from pipelines.glass_scratches.drawing.path_tracing import Picture, trace
-from pipelines.glass_scratches.drawing.stage_view import ScratchedActor, draw_scratched
+from pipelines.glass_scratches.drawing.path_tracing import TracedPicture, trace_picture
+from pipelines.glass_scratches.drawing.stage_view import draw_scratched
+from pipelines.glass_scratches.scratched_glass import ScratchedGlass
 from pipelines.light.built_in_environments import uniform
 from pipelines.light.environment_maps import rotate_environment, solid_angles
 from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
@@ -27,14 +27,6 @@ _CLOSE_AZIMUTH, _CLOSE_ELEVATION = -82.0, 8.0
 FURNACE_SIZE, FURNACE_SAMPLES = 48, 64
 
 
-class ScratchedGlass(NamedTuple):
-    """One scratched solid: its shape, its surface to be traced, and itself on the stage."""
-
-    solid: Solid
-    surface: ScratchedSurface
-    actor: ScratchedActor
-
-
 class GlassFrames(NamedTuple):
     """What scratched glass looks like.
 
@@ -43,11 +35,11 @@ class GlassFrames(NamedTuple):
     furnace: the far view in an environment of radiance 1. exposure: factor for display.
     """
 
-    far: Picture
-    close: Picture
+    far: TracedPicture
+    close: TracedPicture
     stage: NDArray[np.float32]
     moving: NDArray[np.uint8]
-    furnace: Picture
+    furnace: TracedPicture
     exposure: float
 
 
@@ -72,18 +64,18 @@ def draw_frames(
         seed=seed,
         progress=lambda fraction: progress(0.8 * fraction),
     )
-    moving = moving_light(
+    moving = draw_moving_light(
         glass,
         light,
         count=lights,
         size=moving_size,
         progress=lambda fraction: progress(0.8 + 0.15 * fraction),
     )
-    white = furnace(glass.solid, glass.surface, seed)
-    return GlassFrames(far, close, stage, moving, white, exposure(light))
+    white = trace_furnace(glass, seed)
+    return GlassFrames(far, close, stage, moving, white, environment_exposure(light))
 
 
-def cameras(solid: Solid) -> tuple[Camera, Camera]:
+def object_cameras(solid: Solid) -> tuple[Camera, Camera]:
     """The whole object, and its surface from a hand's breadth."""
     middle = (0.0, 0.0, 0.0)
     distance = 1.03 * fitting_distance(
@@ -101,12 +93,41 @@ def cameras(solid: Solid) -> tuple[Camera, Camera]:
     return far, close
 
 
-def exposure(light: EnvironmentSampler) -> float:
+def environment_exposure(light: EnvironmentSampler) -> float:
     """Factor that shows a white matt surface, lit evenly by all of the environment, as 0.35: equal
     for all scratches in the same light."""
     bright = luminance(light.radiance.astype(np.float64))
     solid = solid_angles(len(bright))[:, None]
     return 0.35 * 4 * np.pi / float(np.sum(bright * solid))
+
+
+def exposed(radiance: NDArray[np.floating], light: EnvironmentSampler) -> NDArray[np.uint8]:
+    """Radiance (..., 3) in an environment as it is displayed, 8 bits sRGB."""
+    return to_8bit(radiance * environment_exposure(light))
+
+
+def trace_view(
+    glass: ScratchedGlass,
+    light: EnvironmentSampler,
+    camera: Camera,
+    *,
+    size: int,
+    samples: int,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> TracedPicture:
+    """A picture of size x size pixels, by ``samples`` paths a pixel."""
+    return trace_picture(
+        glass.solid,
+        glass.surface,
+        light,
+        camera,
+        width=size,
+        height=size,
+        samples=samples,
+        seed=seed,
+        progress=progress,
+    )
 
 
 def trace_views(
@@ -117,17 +138,15 @@ def trace_views(
     samples: int,
     seed: int,
     progress: Callable[[float], None],
-) -> tuple[tuple[Picture, Picture], NDArray[np.float32]]:
+) -> tuple[tuple[TracedPicture, TracedPicture], NDArray[np.float32]]:
     """Far and close view of size x size pixels: ``samples`` paths a pixel, and by the shader."""
-    views = cameras(glass.solid)
+    views = object_cameras(glass.solid)
     far, close = (
-        trace(
-            glass.solid,
-            glass.surface,
+        trace_view(
+            glass,
             light,
             camera,
-            width=size,
-            height=size,
+            size=size,
             samples=samples,
             seed=seed,
             progress=lambda fraction, number=number: progress((number + fraction) / 2),  # type: ignore[misc]
@@ -141,21 +160,13 @@ def trace_views(
     return (far, close), np.stack([picture[..., :3] for picture in stage])
 
 
-def furnace(solid: Solid, surface: ScratchedSurface, seed: int) -> Picture:
+def trace_furnace(glass: ScratchedGlass, seed: int) -> TracedPicture:
     """The far view in an environment of radiance 1: nowhere brighter than that."""
-    return trace(
-        solid,
-        surface,
-        make_environment_sampler(uniform(8)),
-        cameras(solid)[0],
-        width=FURNACE_SIZE,
-        height=FURNACE_SIZE,
-        samples=FURNACE_SAMPLES,
-        seed=seed,
-    )
+    light, camera = make_environment_sampler(uniform(8)), object_cameras(glass.solid)[0]
+    return trace_view(glass, light, camera, size=FURNACE_SIZE, samples=FURNACE_SAMPLES, seed=seed)
 
 
-def moving_light(
+def draw_moving_light(
     glass: ScratchedGlass,
     light: EnvironmentSampler,
     *,
@@ -164,7 +175,7 @@ def moving_light(
     progress: Callable[[float], None],
 ) -> NDArray[np.uint8]:
     """The close view on the stage while the light turns once around: (count, size, size, 3)."""
-    camera = cameras(glass.solid)[1]
+    camera = object_cameras(glass.solid)[1]
     pictures = []
     for number in range(count):
         progress(number / count)
@@ -175,4 +186,4 @@ def moving_light(
             glass.actor, turned, camera, width=size, height=size, supersampling=2
         )
         pictures.append(drawn[..., :3])
-    return to_8bit(np.stack(pictures) * exposure(light))
+    return exposed(np.stack(pictures), light)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.layers.feature_search import LayerArrays
-from pipelines.glass_scratches.tables.sampling import Lobe
+from pipelines.glass_scratches.tables.lobe import Lobe
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 

@@ -40,11 +40,15 @@ from pipelines.glass_scratches.drawing.path_state import (
     ScratchedSurface,
     TracedGlass,
 )
-from pipelines.glass_scratches.layers.coverage import flatten_pyramid, pyramid
+from pipelines.glass_scratches.layers.coverage import flatten_mips, mip_pyramid
 from pipelines.glass_scratches.layers.feature_search import LayerArrays
 from pipelines.glass_scratches.tables.bins import bin_weights
-from pipelines.glass_scratches.tables.sampling import Lobe
-from pipelines.glass_scratches.tables.scratch_table import Lean, check_index, interpolated_factor
+from pipelines.glass_scratches.tables.fresnel import (
+    FresnelFactors,
+    check_refractive_index,
+    interpolated_fresnel,
+)
+from pipelines.glass_scratches.tables.lobe import Lobe
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 if TYPE_CHECKING:
@@ -60,7 +64,7 @@ _OFFSET = 2e-4
 _MOST_FLATS = 4
 
 
-class Picture(NamedTuple):
+class TracedPicture(NamedTuple):
     """``radiance`` (H, W, 3) float32 linear; ``variance`` (H, W) float32 of its mean over the
     channels; ``scratched`` (H, W) float32: share of the paths that met a scratch; ``rays``."""
 
@@ -70,11 +74,11 @@ class Picture(NamedTuple):
     rays: int
 
 
-def make_surface(
+def make_scratched_surface(
     layers: LayerArrays,
     coverage: NDArray[np.float32],
     lobe: Lobe,
-    lean: Lean,
+    fresnel: FresnelFactors,
     *,
     roughness: float,
     tile: float,
@@ -84,10 +88,10 @@ def make_surface(
 
     Raises ValueError for an index or tile that is not positive, and an R that is no power of two.
     """
-    check_index(index)
+    check_refractive_index(index)
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
-    flat, offsets = flatten_pyramid(pyramid(coverage))
+    flat, offsets = flatten_mips(mip_pyramid(coverage))
     return ScratchedSurface(
         layers,
         flat,
@@ -96,21 +100,23 @@ def make_surface(
         tile,
         lobe,
         roughness,
-        lean.factor[0],
-        lean.gamma,
+        fresnel.factor[0],
+        fresnel.gamma,
         index,
-        _mean_factor(lean),
+        _mean_fresnel(fresnel),
     )
 
 
-def _mean_factor(lean: Lean) -> float:
+def _mean_fresnel(fresnel: FresnelFactors) -> float:
     """F over the hemisphere weighted by the cosine: cos phi dphi / 2 times (2 / pi) cos² theta."""
     theta = (np.arange(512) + 0.5) / 512 * np.pi / 2
     weight = np.cos(theta) ** 2 / np.sum(np.cos(theta) ** 2)
-    return float(weight @ interpolated_factor(lean, theta) @ bin_weights(len(lean.gamma)) / 2)
+    return float(
+        weight @ interpolated_fresnel(fresnel, theta) @ bin_weights(len(fresnel.gamma)) / 2
+    )
 
 
-def trace(
+def trace_picture(
     solid: Solid,
     surface: ScratchedSurface,
     environment: EnvironmentSampler,
@@ -122,7 +128,7 @@ def trace(
     seed: int = 0,
     strategy: Strategy = "importance",
     progress: Callable[[float], None] = lambda fraction: None,
-) -> Picture:
+) -> TracedPicture:
     """Trace ``samples`` paths a pixel through a picture of width x height pixels.
 
     Positions in the pixel and the numbers of the first scatterings are stratified (the R2
@@ -152,7 +158,7 @@ def trace(
         scratched[pixels] = met.reshape(len(pixels), samples).mean(axis=1)
     progress(1.0)
     grid = (height, width)
-    return Picture(
+    return TracedPicture(
         radiance.reshape(*grid, 3), variance.reshape(grid), scratched.reshape(grid), rays
     )
 

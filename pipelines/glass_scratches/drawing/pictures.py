@@ -58,8 +58,8 @@ def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
     return canvas_picture(canvas)
 
 
-def lean_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Fresnel's factor over the lean as it is interpolated, for three views phi_o."""
+def fresnel_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Fresnel's factor over theta_o as it is interpolated, for three views phi_o."""
     figure, canvas = new_figure(5.4, 3.4)
     axis = figure.subplots()
     theta = np.linspace(0.0, np.pi / 2, 200)

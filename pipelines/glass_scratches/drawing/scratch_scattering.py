@@ -19,7 +19,8 @@ from pipelines.glass_scratches.drawing.vectors import (
     stepped,
 )
 from pipelines.glass_scratches.tables import sampling
-from pipelines.glass_scratches.tables.sampling import Direction, bin_of
+from pipelines.glass_scratches.tables.lobe import Direction
+from pipelines.glass_scratches.tables.sampling import phi_bin
 from pipelines.light.environment_lookup import radiance_from_direction
 from pipelines.light.environment_sampling import sample_direction
 
@@ -62,7 +63,7 @@ class _View(NamedTuple):
 def fresnel_factor(surface, direction):  # type: ignore[no-untyped-def]
     """F of a view (u, v, n) by Eq. 3 and 4, with F = 1 at theta_o = pi / 2."""
     u, v, n = direction
-    view = bin_of(v, n, len(surface.gamma))
+    view = phi_bin(v, n, len(surface.gamma))
     theta = abs(np.arcsin(min(max(u, -1.0), 1.0)))
     share = (2.0 * theta / np.pi) ** surface.gamma[view]
     return share + (1.0 - share) * surface.head_on[view]
@@ -97,7 +98,7 @@ def scatter(glass, paths, i, at, event, u, results):  # type: ignore[no-untyped-
     ``u`` in [0, 1) chooses between outside and inside.
     """
     paths.cone_angle[i] = _SCATTERED_ANGLE
-    u_lean, u_wall = path_numbers(event, WALL)
+    u_theta, u_wall = path_numbers(event, WALL)
     clear = u_wall >= glass.surface.roughness
     if clear and not at.outside:
         _leave_or_reflect(glass.surface, paths, i, at.frame, u)
@@ -107,7 +108,7 @@ def scatter(glass, paths, i, at, event, u, results):  # type: ignore[no-untyped-
         _add_light(glass, paths, i, at, view, event, results)
     density = 0.0
     if u < view.out_chance:
-        way, gain, density = _scattered_out(glass, at, view, event, u_lean)
+        way, gain, density = _scattered_out(glass, at, view, event, u_theta)
     elif clear:  # inside, bent as by the smooth surface
         gain = (1.0 - view.fresnel) / (1.0 - view.out_chance)
         way = _bent(view.direction, glass.surface.refractive_index)
@@ -147,7 +148,7 @@ def _view(surface, at, came):  # type: ignore[no-untyped-def]
     if not at.outside:
         return _View(direction, 0.0, 0.0, 0.5)
     fresnel = fresnel_factor(surface, direction)
-    returned = fresnel * surface.lobe.share[at.place, bin_of(-v, -n, len(surface.gamma))]
+    returned = fresnel * surface.lobe.share[at.place, phi_bin(-v, -n, len(surface.gamma))]
     out_chance = max(returned / (returned + 1.0 - fresnel), _LEAST_REFLECTED)
     return _View(direction, fresnel, returned, out_chance)
 
@@ -182,7 +183,7 @@ def _add_light(glass, paths, i, at, view, event, results):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _scattered_out(glass, at, view, event, u_lean):  # type: ignore[no-untyped-def]
+def _scattered_out(glass, at, view, event, u_theta):  # type: ignore[no-untyped-def]
     """A direction outside, what light from there is multiplied with, and its density."""
     surface = glass.surface
     u1, u2 = path_numbers(event, DIRECTION)
@@ -196,7 +197,7 @@ def _scattered_out(glass, at, view, event, u_lean):  # type: ignore[no-untyped-d
             gain = (1.0 - fresnel_factor(surface, way)) / (np.pi * surface.refractive_index**2)
         gain *= 2.0 * np.pi * way.n
     elif at.outside:
-        way = sampling.sample(surface.lobe, at.place, view.direction, u1, u2, u_lean)
+        way = sampling.sample(surface.lobe, at.place, view.direction, u1, u2, u_theta)
         gain = view.returned
         own = sampling.pdf(surface.lobe, at.place, view.direction, way)
         density = view.out_chance * own

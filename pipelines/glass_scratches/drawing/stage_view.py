@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Camera, Stage, surface, texture
-from pipelines.glass_scratches.tables.scratch_table import Lean
+from pipelines.glass_scratches.tables.fresnel import FresnelFactors
 from pipelines.light.environment_sampling import EnvironmentSampler, sample_directions
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class ScratchedActor:
         coverage: NDArray[np.float32],
         angles: NDArray[np.floating],
         rho: NDArray[np.floating],
-        lean: Lean,
+        lean: FresnelFactors,
         *,
         index: float,
         tile: float,

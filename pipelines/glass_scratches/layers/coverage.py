@@ -30,6 +30,12 @@ def coverage_maps(layers: Layers, resolution: int, samples: int = 16) -> FloatAr
     """Mean opacity (L, R, R) in each texel, of ``samples`` points in it.
 
     Row 0 lies at y = 0, column 0 at x = 0. Raises ValueError for less than one texel or point.
+
+    >>> from pipelines.glass_scratches.layers.scratch_layers import make_layers
+    >>> from pipelines.glass_scratches.layers.settings import LayerSpec
+    >>> maps = coverage_maps(make_layers(LayerSpec(length=0.6, width=0.01), seed=1), 32)
+    >>> maps.shape, bool(maps.max() <= 1.0)
+    ((4, 32, 32), True)
     """
     if resolution < 1:
         raise ValueError(f"resolution of the coverage is {resolution}; expected 1 or more.")
@@ -40,10 +46,13 @@ def coverage_maps(layers: Layers, resolution: int, samples: int = 16) -> FloatAr
     return out
 
 
-def pyramid(maps: FloatArray) -> list[FloatArray]:
+def mip_pyramid(maps: FloatArray) -> list[FloatArray]:
     """Mip levels (L, R / 2^k, R / 2^k) of maps (L, R, R), down to one texel; means are kept.
 
     Raises ValueError for maps that are not square or whose side is not a power of two.
+
+    >>> [level.shape for level in mip_pyramid(np.ones((1, 4, 4), np.float32))]
+    [(1, 4, 4), (1, 2, 2), (1, 1, 1)]
     """
     if maps.ndim != 3 or maps.shape[1] != maps.shape[2] or maps.shape[1].bit_count() != 1:
         raise ValueError(
@@ -59,7 +68,7 @@ def pyramid(maps: FloatArray) -> list[FloatArray]:
     return levels
 
 
-def flatten_pyramid(levels: list[FloatArray]) -> tuple[FloatArray, NDArray[np.int64]]:
+def flatten_mips(levels: list[FloatArray]) -> tuple[FloatArray, NDArray[np.int64]]:
     """All levels in one array, and where each begins, the end last (levels + 1,)."""
     offsets = np.concatenate([[0], np.cumsum([level.size for level in levels])])
     return np.concatenate([level.ravel() for level in levels]), offsets
@@ -138,7 +147,7 @@ def filtered_coverage(
 ) -> float:
     """Coverage of a layer in the texel of a mip level that a point of the tile lies in.
 
-    flat_pyramid, offsets: as ``flatten_pyramid`` makes them. resolution: R of level 0. level: 0 to
+    flat_pyramid, offsets: as ``flatten_mips`` makes them. resolution: R of level 0. level: 0 to
         log2 R, others are taken as the nearest of them.
     """
     level = max(0, min(level, len(offsets) - 2))

@@ -33,7 +33,7 @@ _CELLS = 6
 """Cells along a side of the first stage."""
 
 
-def stages(spec: LayerSpec, seed: int, size: int, layer: int = 0) -> NDArray[np.uint8]:
+def layer_stages(spec: LayerSpec, seed: int, size: int, layer: int = 0) -> NDArray[np.uint8]:
     """Figure 4, (3, size, size): cell noise, the same turned and stretched, and thresholded.
 
     The second and third are the tile of ``make_layers(spec, seed)``, each feature in its own metric

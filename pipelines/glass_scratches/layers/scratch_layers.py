@@ -65,6 +65,10 @@ def make_layers(spec: LayerSpec, seed: int) -> Layers:
 
     Raises ValueError for settings out of range, and for a coverage that such scratches cannot
     reach.
+
+    >>> layers = make_layers(LayerSpec(length=0.6, width=0.01, layers=3), seed=1)
+    >>> layers.angle.shape, layers.features.centre.shape
+    ((3,), (496, 2))
     """
     spec.validate()
     angles, draws = _draw(spec, seed)

@@ -16,7 +16,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
-from pipelines.glass_scratches.tables.exact import check_albedo
+from pipelines.glass_scratches.tables.walls import bounce_blur, check_albedo
 
 PLACES = 16
 """Parts of the opening's width for which paths are counted apart."""
@@ -41,17 +41,7 @@ class PathCounts(NamedTuple):
     paths_per_ray: int
 
 
-def blur_of(roughness: float) -> float:
-    """Standard deviation of the blurred sine: 0 for a mirror, infinite for Lambert's law.
-
-    Raises ValueError for a roughness outside [0, 1].
-    """
-    if not 0.0 <= roughness <= 1.0:
-        raise ValueError(f"roughness is {roughness:g}; expected 0 (mirror) to 1 (diffuse).")
-    return np.inf if roughness == 1.0 else roughness / (1.0 - roughness)
-
-
-def shoot(
+def shoot_paths(
     profile: NDArray[np.float64],
     *,
     bins: int,
@@ -67,10 +57,11 @@ def shoot(
     A ray enters at a random place of the opening, from a random direction of its bin (by the
     cosine); all its paths start there. ``incidence`` limits the bins that are shot from; the others
     count no paths. Walls keep a path with probability 1 - albedo. The result depends on the seed
-    alone, not on the number of threads. Raises ValueError as :func:`blur_of`, ``check_albedo``.
+    alone, not on the number of threads. Raises ValueError for an
+    albedo or a roughness outside [0, 1].
     """
     check_albedo(albedo)
-    walls = _walls(profile, albedo, blur_of(roughness))
+    walls = _walls(profile, albedo, bounce_blur(roughness))
     chosen = np.arange(bins) if incidence is None else incidence
     counts = PathCounts(
         np.zeros((bins, PLACES, bins), np.int64),
@@ -93,7 +84,7 @@ class PathTable(NamedTuple):
     absorbed: NDArray[np.float64]
 
 
-def table(counts: PathCounts) -> PathTable:
+def table_of_counts(counts: PathCounts) -> PathTable:
     """The table of the counted paths, normalised as the exact one.
 
     Places are those where the *view's* ray enters: by reciprocity the counts of paths that start

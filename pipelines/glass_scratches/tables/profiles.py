@@ -32,6 +32,11 @@ def built_in_profile(shape: Shape, width: float, depth: float) -> NDArray[np.flo
 
     Raises ValueError for a width or depth that is not positive, and for a u deeper than half its
     width (its opening would be narrower than it).
+
+    >>> built_in_profile("v", width=10.0, depth=4.0).tolist()
+    [[-5.0, 0.0], [0.0, -4.0], [5.0, 0.0]]
+    >>> built_in_profile("u", width=10.0, depth=4.0).shape
+    (49, 2)
     """
     for name, value in (("width", width), ("depth", depth)):
         if not (np.isfinite(value) and value > 0):
@@ -67,6 +72,9 @@ def cut_profile(points: ArrayLike, name: str) -> NDArray[np.float64]:
     Raises ValueError, with ``name`` in it, for what is no scratch: fewer than three points, values
     that are not finite, no point deeper than its ends, ends that run back under themselves, a
     polyline that crosses or touches itself.
+
+    >>> cut_profile([(0, 0), (2, 1), (4, -3), (6, 1), (8, 0)], "groove").tolist()
+    [[-2.0, 0.0], [0.0, -4.0], [2.0, 0.0]]
     """
     given = np.asarray(points, dtype=np.float64)
     if given.ndim != 2 or given.shape[1] != 2 or len(given) < 3 or not np.isfinite(given).all():

@@ -6,9 +6,9 @@ Directions are unit vectors (along u, across v, normal n) that point away from t
     f = (2 / pi²) rho_m(phi_o, phi_i) k(theta_o, theta_i)
 
 and f cos dω splits into [rho_m cos phi dphi / pi] [(2 / pi) k cos² theta dtheta]. Diffuse walls
-forget the lean along the scratch: k = 1. A mirror turns it over. In between the lean's quantile
-c(theta), uniform under cos², is blurred and folded like the bounces of the 2-D paths, so k is
-symmetric and its mean is one for every roughness.
+forget theta, how far light leans along the scratch: k = 1. A mirror turns it over. In between its
+quantile c(theta), uniform under cos², is blurred and folded like the bounces of the 2-D paths, so k
+is symmetric and its mean is one for every roughness.
 
 The view's phi is taken at the nearest bin; inside the light's bin the sine of phi is uniform. So
 evaluate, sample and pdf agree exactly.
@@ -16,81 +16,28 @@ evaluate, sample and pdf agree exactly.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
-from pipelines.glass_scratches.tables.monte_carlo import blur_of
-
-_LEAST_BLUR = 0.01
-"""Of the lean of a mirror: lobes of half a degree can still be evaluated."""
-
-
-class Direction(NamedTuple):
-    """A unit vector in the scratch's frame: along the scratch, across it, and its normal."""
-
-    u: float
-    v: float
-    n: float
-
-
-class Lobe(NamedTuple):
-    """What the kernels need of a table.
-
-    ``rho`` (places, M, M) float32; ``cdf`` (places, M, M + 1) float32 over the light's bins, from
-    0 to 1; ``share`` (places, M) float32: part of the light that leaves; ``sines`` (M + 1,) of the
-    bins' borders; ``blur`` of the lean's quantile, infinite where k = 1.
-    """
-
-    rho: NDArray[np.float32]
-    cdf: NDArray[np.float32]
-    share: NDArray[np.float32]
-    sines: NDArray[np.float64]
-    blur: float
-
-
-def make_lobe(across: NDArray[np.float32], roughness: float) -> Lobe:
-    """The lobe of a table's ``across`` (places, M, M)."""
-    bins = across.shape[1]
-    part = across.astype(np.float64) * bin_weights(bins) / np.pi
-    share = part.sum(axis=-1)
-    running = np.cumsum(part, axis=-1) / np.where(share > 0, share, 1.0)[..., None]
-    cdf = np.concatenate([np.zeros((*share.shape, 1)), running], axis=-1)
-    cdf[..., -1] = 1.0
-    return lobe_of(across, cdf.astype(np.float32), share.astype(np.float32), roughness)
-
-
-def lobe_of(
-    across: NDArray[np.float32],
-    cdf: NDArray[np.float32],
-    share: NDArray[np.float32],
-    roughness: float,
-) -> Lobe:
-    """A lobe whose sums were made before. Raises ValueError for a roughness outside [0, 1]."""
-    # Half: the quantile runs over (0, 1), the bounce's sine over (-1, 1).
-    blur = max(blur_of(roughness) / 2, _LEAST_BLUR)
-    return Lobe(across, cdf, share, np.sin(bin_edges(across.shape[1])), float(blur))
+from pipelines.glass_scratches.tables.lobe import Direction
 
 
 @njit(cache=True, inline="always")
-def bin_of(v, n, bins):  # type: ignore[no-untyped-def]
+def phi_bin(v, n, bins):  # type: ignore[no-untyped-def]
     """The bin of a direction's phi."""
     angle = np.arctan2(v, max(n, 0.0))
     return min(max(int((angle / np.pi + 0.5) * bins), 0), bins - 1)
 
 
 @njit(cache=True)
-def quantile(u):  # type: ignore[no-untyped-def]
-    """Share of cos² theta below the lean whose sine is u."""
+def theta_quantile(u):  # type: ignore[no-untyped-def]
+    """Share of cos² theta below the theta whose sine is u."""
     s = min(max(u, -1.0), 1.0)
     return 0.5 + (np.arcsin(s) + s * np.sqrt(1.0 - s * s)) / np.pi
 
 
 @njit(cache=True)
-def lean_sine(c):  # type: ignore[no-untyped-def]
+def sine_of_quantile(c):  # type: ignore[no-untyped-def]
     """The sine whose quantile is c: Newton's method on the angle, held inside by bisection."""
     low, high = -np.pi / 2, np.pi / 2
     theta = np.pi * (c - 0.5) / 2
@@ -109,7 +56,7 @@ def lean_sine(c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def lean_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
+def theta_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
     """k as a density over the light's quantile, for the view's."""
     if np.isinf(blur):
         return 1.0
@@ -138,8 +85,8 @@ def evaluate(lobe, place, view, light):  # type: ignore[no-untyped-def]
     if on <= 0.0 or i_n <= 0.0:
         return 0.0
     bins = lobe.rho.shape[1]
-    table = lobe.rho[place, bin_of(ov, on, bins), bin_of(iv, i_n, bins)]
-    return 2.0 / np.pi**2 * table * lean_kernel(quantile(ou), quantile(iu), lobe.blur)
+    table = lobe.rho[place, phi_bin(ov, on, bins), phi_bin(iv, i_n, bins)]
+    return 2.0 / np.pi**2 * table * theta_kernel(theta_quantile(ou), theta_quantile(iu), lobe.blur)
 
 
 @njit(cache=True)
@@ -149,7 +96,7 @@ def pdf(lobe, place, view, light):  # type: ignore[no-untyped-def]
     _, _, i_n = light
     if on <= 0.0 or i_n <= 0.0:
         return 0.0
-    kept = lobe.share[place, bin_of(ov, on, lobe.rho.shape[1])]
+    kept = lobe.share[place, phi_bin(ov, on, lobe.rho.shape[1])]
     if kept <= 0.0:
         return 0.0
     return evaluate(lobe, place, view, light) * i_n / kept
@@ -163,7 +110,7 @@ def sample(lobe, place, view, u1, u2, u3):  # type: ignore[no-untyped-def]
     """
     ou, ov, on = view
     bins = lobe.cdf.shape[1]
-    row = lobe.cdf[place, bin_of(ov, on, bins)]
+    row = lobe.cdf[place, phi_bin(ov, on, bins)]
     low, high = 0, bins
     while high - low > 1:
         middle = (low + high) // 2
@@ -174,19 +121,19 @@ def sample(lobe, place, view, u1, u2, u3):  # type: ignore[no-untyped-def]
     width = row[low + 1] - row[low]
     inside = min(max((u1 - row[low]) / width, 0.0), 1.0) if width > 0 else 0.5
     sine = lobe.sines[low] + inside * (lobe.sines[low + 1] - lobe.sines[low])
-    along = _sampled_lean(ou, lobe.blur, u2, u3)
+    along = _sampled_theta_sine(ou, lobe.blur, u2, u3)
     rest = np.sqrt(max(1.0 - along * along, 0.0))
     return Direction(along, rest * sine, rest * np.sqrt(max(1.0 - sine * sine, 0.0)))
 
 
 @njit(cache=True)
-def _sampled_lean(view_sine, blur, u2, u3):  # type: ignore[no-untyped-def]
-    """The sine of a light's lean, drawn for that of a view."""
+def _sampled_theta_sine(view_sine, blur, u2, u3):  # type: ignore[no-untyped-def]
+    """The sine of a light's theta, drawn for that of a view."""
     if np.isinf(blur):
         return np.sqrt(u2) * np.cos(2.0 * np.pi * u3)  # the semicircle's law
     normal = np.sqrt(-2.0 * np.log(1.0 - u2)) * np.cos(2.0 * np.pi * u3)
-    c = 1.0 - quantile(view_sine) + blur * normal
+    c = 1.0 - theta_quantile(view_sine) + blur * normal
     c = np.fmod(c, 2.0)
     if c < 0.0:
         c += 2.0
-    return lean_sine(2.0 - c if c > 1.0 else c)
+    return sine_of_quantile(2.0 - c if c > 1.0 else c)

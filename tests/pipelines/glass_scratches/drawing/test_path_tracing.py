@@ -16,7 +16,12 @@ from pipelines.geometry.solid_shapes import glass_teapot, plate
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing import path_tracing
 from pipelines.glass_scratches.drawing.path_state import ScratchedSurface
-from pipelines.glass_scratches.drawing.path_tracing import Picture, Strategy, make_surface, trace
+from pipelines.glass_scratches.drawing.path_tracing import (
+    Strategy,
+    TracedPicture,
+    make_scratched_surface,
+    trace_picture,
+)
 from pipelines.glass_scratches.drawing.scratch_scattering import fresnel_factor
 from pipelines.glass_scratches.drawing.smooth_glass import reflectance
 from pipelines.glass_scratches.layers.coverage import coverage_maps
@@ -25,14 +30,10 @@ from pipelines.glass_scratches.layers.features import layer_arrays
 from pipelines.glass_scratches.layers.scratch_layers import make_layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.fresnel import Fresnel, fresnel_factors, interpolated_fresnel
+from pipelines.glass_scratches.tables.lobe import make_lobe
 from pipelines.glass_scratches.tables.profiles import built_in_profile
-from pipelines.glass_scratches.tables.sampling import make_lobe
-from pipelines.glass_scratches.tables.scratch_table import (
-    Fresnel,
-    interpolated_factor,
-    lean_factors,
-    scratch_table,
-)
+from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
 from pipelines.light.built_in_environments import sky, uniform
 from pipelines.light.environment_lookup import radiance_from_directions
 from pipelines.light.environment_maps import Radiance
@@ -58,7 +59,7 @@ def surface(
     tile: float = 1.0,
     index: float = INDEX,
 ) -> ScratchedSurface:
-    made = scratch_table(
+    made = scratch_brdf_table(
         built_in_profile("v", 10.0, 4.0),
         bins=BINS,
         albedo=albedo,
@@ -70,11 +71,11 @@ def surface(
         seed=1,
     )
     layers = make_layers(spec, 1)
-    return make_surface(
+    return make_scratched_surface(
         layer_arrays(layers),
         coverage_maps(layers, resolution),
         make_lobe(made.across, roughness),
-        lean_factors(BINS, index, "paper"),
+        fresnel_factors(BINS, index, "paper"),
         roughness=roughness,
         tile=tile,
         index=index,
@@ -103,8 +104,8 @@ def picture(
     samples: int = 64,
     seed: int = 0,
     strategy: Strategy = "importance",
-) -> Picture:
-    return trace(
+) -> TracedPicture:
+    return trace_picture(
         solid, made, light, camera, width=size, height=size, samples=samples, seed=seed,
         strategy=strategy,
     )  # fmt: skip
@@ -115,7 +116,7 @@ def blocks(values: Floats) -> Floats:
     return values.reshape(height // 4, 4, width // 4, 4).mean(axis=(1, 3))
 
 
-def block_means(found: Picture) -> tuple[Floats, Floats]:
+def block_means(found: TracedPicture) -> tuple[Floats, Floats]:
     """Radiance of 4 x 4 blocks and its standard error."""
     mean = found.radiance.astype(np.float64).mean(axis=2)
     return blocks(mean), np.sqrt(blocks(found.variance.astype(np.float64)) / 16)
@@ -272,9 +273,9 @@ def test_grey_walls_take_light_away(teapot: Solid) -> None:
 
 def let_out(index: float) -> tuple[Floats, float]:
     """F of views at theta 0 (M,), and (1 - mean F) / n² of what goes out from inside."""
-    lean = lean_factors(BINS, index, "paper")
+    lean = fresnel_factors(BINS, index, "paper")
     theta = (np.arange(2000) + 0.5) / 2000 * np.pi / 2
-    factor = interpolated_factor(lean, theta)
+    factor = interpolated_fresnel(lean, theta)
     weight = np.cos(theta) ** 2 / (np.cos(theta) ** 2).sum()
     mean = float(weight @ factor @ bin_weights(BINS) / 2)
     return factor[0], (1 - mean) / index**2
@@ -451,7 +452,7 @@ def test_the_picture_depends_on_the_seed_alone(
     light = make_environment_sampler(sky(16, sun_azimuth=0.0, sun_elevation=40.0, sun_radius=20.0))
     made = surface(WORN)
 
-    def again(seed: int = 5) -> Picture:
+    def again(seed: int = 5) -> TracedPicture:
         return picture(teapot, made, light, camera, size=12, samples=16, seed=seed)
 
     one = again()
@@ -468,7 +469,7 @@ def test_the_picture_depends_on_the_seed_alone(
 
 def test_progress_grows_to_one(pane: Solid) -> None:
     told: list[float] = []
-    trace(
+    trace_picture(
         pane, surface(CLEAN), halves(1, 1), facing(), width=4, height=2, samples=4,
         progress=told.append,
     )  # fmt: skip
@@ -482,11 +483,11 @@ def test_progress_grows_to_one(pane: Solid) -> None:
 
 def with_fields(*, tile: float = 1.0, index: float = INDEX, side: int = 8) -> ScratchedSurface:
     layers = layer_arrays(make_layers(CLEAN, 1))
-    return make_surface(
+    return make_scratched_surface(
         layers,
         np.zeros((1, side, side), np.float32),
         make_lobe(np.ones((2, 8, 8), np.float32), 1.0),
-        lean_factors(8, INDEX, "paper"),
+        fresnel_factors(8, INDEX, "paper"),
         roughness=1.0,
         tile=tile,
         index=index,
@@ -496,8 +497,8 @@ def with_fields(*, tile: float = 1.0, index: float = INDEX, side: int = 8) -> Sc
 @pytest.mark.parametrize("variant", ["paper", "physical"])
 def test_the_mean_factor_is_f_over_the_hemisphere(variant: Fresnel) -> None:
     """By random directions in proportion to the cosine."""
-    lean = lean_factors(64, INDEX, variant)
-    made = make_surface(
+    lean = fresnel_factors(64, INDEX, variant)
+    made = make_scratched_surface(
         layer_arrays(make_layers(CLEAN, 1)),
         np.zeros((1, 8, 8), np.float32),
         make_lobe(np.ones((2, 64, 64), np.float32), 1.0),
@@ -511,7 +512,7 @@ def test_the_mean_factor_is_f_over_the_hemisphere(variant: Fresnel) -> None:
     u, v = radius * np.cos(turn), radius * np.sin(turn)
     phi, theta = np.arctan2(v, np.sqrt(1 - radius**2)), np.arcsin(u)
     view = np.clip(((phi / np.pi + 0.5) * 64).astype(int), 0, 63)
-    factor = interpolated_factor(lean, theta)[np.arange(len(theta)), view]
+    factor = interpolated_fresnel(lean, theta)[np.arange(len(theta)), view]
     error = factor.std() / math.sqrt(len(factor))
     assert made.mean_fresnel == pytest.approx(factor.mean(), abs=4.5 * error)
     views = zip(u[:200], v[:200], np.sqrt(1 - radius[:200] ** 2), strict=True)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pipelines.glass_scratches.layers.coverage import (
     coverage_maps,
     filtered_coverage,
-    flatten_pyramid,
-    pyramid,
+    flatten_mips,
+    mip_pyramid,
     visible_areas,
 )
 from pipelines.glass_scratches.layers.feature_noise import KNOTS, noise_along
@@ -31,7 +31,7 @@ from pipelines.glass_scratches.layers.features import (
     layer_arrays,
     layers_of_features,
 )
-from pipelines.glass_scratches.layers.pictures import WHITE, layers_picture, stages
+from pipelines.glass_scratches.layers.pictures import WHITE, layer_stages, layers_picture
 from pipelines.glass_scratches.layers.scratch_layers import make_layers, solve_thresholds
 from pipelines.glass_scratches.layers.settings import LayerSpec
 
@@ -329,10 +329,15 @@ def test_spread_keeps_the_mean_area() -> None:
     [
         (LayerSpec(length=0.6, width=0.01), 0.02),
         (LayerSpec(length=0.2, width=0.05), 0.6),
-        (LayerSpec(length=0.5, width=0.02, curvature=1.0, spread=0.4), 0.1),
-        (LayerSpec(length=0.4, width=0.01, fading=0.8, breaks=0.4), 0.05),
         (replace(WORN, digs=0.5), 0.15),
-        (LayerSpec(length=0.1, width=0.1, digs=1.0), 0.3),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in (
+                (LayerSpec(length=0.5, width=0.02, curvature=1.0, spread=0.4), 0.1),
+                (LayerSpec(length=0.4, width=0.01, fading=0.8, breaks=0.4), 0.05),
+                (LayerSpec(length=0.1, width=0.1, digs=1.0), 0.3),
+            )
+        ),
     ],
 )
 def test_a_layer_covers_what_was_asked_for(spec: LayerSpec, coverage: float) -> None:
@@ -367,7 +372,7 @@ def test_visible_areas_add_up_to_the_coverage_of_the_maps() -> None:
 
 def test_the_pyramid_keeps_the_mean_at_every_level() -> None:
     maps = coverage_maps(make_layers(WORN, 1), 64, 4)
-    levels = pyramid(maps)
+    levels = mip_pyramid(maps)
     assert [level.shape for level in levels] == [(3, 64 >> k, 64 >> k) for k in range(7)]
     for level in levels:
         np.testing.assert_allclose(
@@ -382,7 +387,7 @@ def test_the_pyramid_keeps_the_mean_at_every_level() -> None:
 @pytest.mark.parametrize("level", [2, 3, 5])
 def test_filtered_coverage_is_the_mean_opacity_over_the_texel(level: int) -> None:
     layers = make_layers(WORN, 5)
-    flat, offsets = flatten_pyramid(pyramid(coverage_maps(layers, 128, 64)))
+    flat, offsets = flatten_mips(mip_pyramid(coverage_maps(layers, 128, 64)))
     size = 128 >> level
     rng = np.random.default_rng(9)
     for layer, x, y in ((0, 0.3, 0.7), (1, 0.99, 0.01), (2, 0.51, 0.49)):
@@ -397,8 +402,8 @@ def test_filtered_coverage_is_the_mean_opacity_over_the_texel(level: int) -> Non
 
 
 def test_levels_beyond_the_pyramid_are_its_first_and_last() -> None:
-    levels = pyramid(np.arange(32, dtype=np.float32).reshape(2, 4, 4))
-    flat, offsets = flatten_pyramid(levels)
+    levels = mip_pyramid(np.arange(32, dtype=np.float32).reshape(2, 4, 4))
+    flat, offsets = flatten_mips(levels)
     np.testing.assert_array_equal(offsets, [0, 32, 40, 42])
     assert filtered_coverage(flat, offsets, 4, 1, -3, 0.3, 0.9) == 16 + 3 * 4 + 1
     assert filtered_coverage(flat, offsets, 4, 1, 9, 0.3, 0.9) == 16 + 7.5
@@ -541,7 +546,7 @@ def test_maps_of_a_wrong_size_are_refused() -> None:
             coverage_maps(layers, resolution, samples)
     for shape in ((1, 6, 6), (1, 4, 8), (8, 8)):
         with pytest.raises(ValueError, match=r"expected \(layers, R, R\), R a power of two"):
-            pyramid(np.zeros(shape, np.float32))
+            mip_pyramid(np.zeros(shape, np.float32))
 
 
 # ---- pictures ----------------------------------------------------------------------------------
@@ -549,7 +554,7 @@ def test_maps_of_a_wrong_size_are_refused() -> None:
 
 @pytest.mark.parametrize("spec", [COARSE, replace(WORN, coverage=0.1)])
 def test_the_third_stage_is_the_second_thresholded_and_the_layer_itself(spec: LayerSpec) -> None:
-    even, stretched, scratches = stages(spec, 3, 64, layer=1)
+    even, stretched, scratches = layer_stages(spec, 3, 64, layer=1)
     assert even.dtype == stretched.dtype == scratches.dtype == np.uint8
     assert set(np.unique(scratches)) == {0, 255}
     threshold = solve_thresholds(spec, 3)[1]
@@ -564,7 +569,7 @@ def test_the_third_stage_is_the_second_thresholded_and_the_layer_itself(spec: La
 
 
 def test_the_first_stage_is_the_noise_of_a_few_dozen_round_cells() -> None:
-    even = stages(COARSE, 3, 96)[0].astype(np.float64) / 255 * WHITE
+    even = layer_stages(COARSE, 3, 96)[0].astype(np.float64) / 255 * WHITE
     # P(F1 > r) = exp(-pi r²): the mean is 1/2.
     assert even.mean() == pytest.approx(0.5, abs=0.1)
     # The way to the nearest feature changes by no more than the step does.
@@ -575,9 +580,9 @@ def test_the_first_stage_is_the_noise_of_a_few_dozen_round_cells() -> None:
 
 def test_stages_that_cannot_be_drawn_are_refused() -> None:
     with pytest.raises(ValueError, match=r"^layer of the stages is 3; expected 0 to 2\.$"):
-        stages(COARSE, 0, 8, layer=3)
+        layer_stages(COARSE, 0, 8, layer=3)
     with pytest.raises(ValueError, match=r"^size of the stages is 0; expected 1 or more\.$"):
-        stages(COARSE, 0, 0)
+        layer_stages(COARSE, 0, 0)
 
 
 def test_layers_are_drawn_in_the_colours_of_their_directions_y_up() -> None:

@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
-from pipelines.glass_scratches.tables.exact import exchange, solve
 from pipelines.glass_scratches.tables.monte_carlo import (
     PLACES,
     PathCounts,
     _folded,
-    blur_of,
-    shoot,
-    table,
+    shoot_paths,
+    table_of_counts,
 )
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
+from pipelines.glass_scratches.tables.radiosity import solve_radiosity, view_factors
+from pipelines.glass_scratches.tables.walls import bounce_blur
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def paths(
     seed: int = 1,
     incidence: NDArray[np.int64] | None = None,
 ) -> PathCounts:
-    return shoot(
+    return shoot_paths(
         profile,
         bins=bins,
         rays=rays,
@@ -73,7 +73,7 @@ def usual(statistic: float, freedom: int) -> bool:
 def test_diffuse_paths_are_counted_as_the_exact_table_has_them(name: str, albedo: float) -> None:
     """Multinomial: chi square of each incidence's counts, the walls' included."""
     facets = {"v": 200, "keyhole": 400}[name]
-    exact = solve(exchange(PROFILES[name], BINS, facets), albedo)
+    exact = solve_radiosity(view_factors(PROFILES[name], BINS, facets), albedo)
     counts = paths(PROFILES[name], albedo=albedo, seed=2)
     share = np.vstack([exact.rho * bin_weights(BINS)[:, None] / np.pi, exact.absorbed])
     found = np.vstack([counts.leaving.sum(axis=1).T, counts.kept])
@@ -94,14 +94,14 @@ def four_by_four(values: Floats) -> Floats:
 
 @pytest.mark.parametrize("name", PROFILES)
 def test_walls_of_albedo_a_half_keep_what_the_exact_table_says(name: str) -> None:
-    exact = solve(exchange(PROFILES[name], BINS, 200), 0.5)
+    exact = solve_radiosity(view_factors(PROFILES[name], BINS, 200), 0.5)
     counts = paths(PROFILES[name], albedo=0.5, seed=3)
     np.testing.assert_array_equal(counts.kept + counts.leaving.sum(axis=(1, 2)), 10_000)
     z = (counts.kept / 10_000 - exact.absorbed) / np.sqrt(
         exact.absorbed * (1 - exact.absorbed) / 10_000
     )
     assert usual((z**2).sum(), BINS)
-    np.testing.assert_array_equal(table(counts).absorbed, counts.kept / 10_000)
+    np.testing.assert_array_equal(table_of_counts(counts).absorbed, counts.kept / 10_000)
 
 
 def test_black_walls_keep_everything() -> None:
@@ -119,7 +119,7 @@ def test_a_table_is_normalised_as_the_exact_one() -> None:
     leaving[:, 0, 2], leaving[:, 3, 2] = 5, 5
     squares = np.zeros((8, 8), np.int64)
     squares[:, 2] = 50
-    made = table(PathCounts(leaving, squares, np.zeros(8, np.int64), 2, 5))
+    made = table_of_counts(PathCounts(leaving, squares, np.zeros(8, np.int64), 2, 5))
     weight = bin_weights(8)
     np.testing.assert_allclose(made.rho[2], np.pi / weight[2])
     assert not np.delete(made.rho, 2, axis=0).any()
@@ -132,7 +132,9 @@ def test_a_table_is_normalised_as_the_exact_one() -> None:
 def test_the_standard_error_is_that_of_repeated_tables() -> None:
     """Paths of one ray start at one place, so they are not independent; the errors know."""
     seeds, rays, each = 120, 150, 40
-    made = [table(paths(bins=8, rays=rays, each=each, seed=seed)) for seed in range(seeds)]
+    made = [
+        table_of_counts(paths(bins=8, rays=rays, each=each, seed=seed)) for seed in range(seeds)
+    ]
     variance = np.var([one.rho for one in made], axis=0, ddof=1)
     reported = np.mean([one.standard_error**2 for one in made], axis=0)
     # Relative error of a variance: sqrt(2 / 119) = 0.13 for each of 64 entries.
@@ -144,8 +146,8 @@ def test_the_standard_error_is_that_of_repeated_tables() -> None:
 
 
 def test_several_paths_a_ray_have_the_same_mean() -> None:
-    exact = solve(exchange(V, 8, 200), 1.0)
-    made = table(paths(bins=8, rays=3000, each=10, seed=4))
+    exact = solve_radiosity(view_factors(V, 8, 200), 1.0)
+    made = table_of_counts(paths(bins=8, rays=3000, each=10, seed=4))
     z = (made.rho - exact.rho) / made.standard_error
     # 7 free entries an incidence; nearly, since errors are estimated.
     assert 20 < (z**2).sum() < 110
@@ -183,7 +185,9 @@ def test_light_and_view_may_be_swapped(name: str, roughness: float) -> None:
 
 def test_nearly_diffuse_is_diffuse() -> None:
     one = paths(roughness=0.999, rays=20_000, seed=6).leaving.sum(axis=1).astype(np.float64)
-    exact = solve(exchange(V, BINS, 200), 1.0).rho * bin_weights(BINS)[:, None] / np.pi
+    exact = (
+        solve_radiosity(view_factors(V, BINS, 200), 1.0).rho * bin_weights(BINS)[:, None] / np.pi
+    )
     expected = 20_000 * exact.T
     z = (one - expected) / np.sqrt(expected)
     assert usual((z**2).sum(), BINS * (BINS - 1))
@@ -191,7 +195,7 @@ def test_nearly_diffuse_is_diffuse() -> None:
 
 def test_a_rougher_mirror_spreads_more() -> None:
     def spread(roughness: float) -> float:
-        made = table(paths(RIGHT_ANGLE, roughness=roughness))
+        made = table_of_counts(paths(RIGHT_ANGLE, roughness=roughness))
         return float((made.rho > 0.05).sum())
 
     assert spread(0.0) < spread(0.05) < spread(0.2)
@@ -268,7 +272,7 @@ def test_the_bounce_is_symmetric_and_keeps_what_is_even(roughness: float) -> Non
     """Counts from sine to sine, of bounces that come evenly: as many there as back."""
     rng = np.random.default_rng(9)
     before = rng.uniform(-1, 1, 200_000)
-    after = fold(before + blur_of(roughness) * rng.standard_normal(len(before)))
+    after = fold(before + bounce_blur(roughness) * rng.standard_normal(len(before)))
     counts, _, _ = np.histogram2d(before, after, bins=12, range=[[-1, 1], [-1, 1]])
     upper = np.triu_indices(12, 1)
     there, back = counts[upper], counts.T[upper]
@@ -280,10 +284,10 @@ def test_the_bounce_is_symmetric_and_keeps_what_is_even(roughness: float) -> Non
 
 
 def test_the_blur_runs_from_mirror_to_diffuse() -> None:
-    assert blur_of(0.0) == 0.0
-    assert blur_of(0.5) == 1.0
-    assert blur_of(1.0) == math.inf
-    assert (np.diff([blur_of(r) for r in np.linspace(0, 1, 50)]) > 0).all()
+    assert bounce_blur(0.0) == 0.0
+    assert bounce_blur(0.5) == 1.0
+    assert bounce_blur(1.0) == math.inf
+    assert (np.diff([bounce_blur(r) for r in np.linspace(0, 1, 50)]) > 0).all()
 
 
 # ---- seeds and threads -----------------------------------------------------------------------

@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from pipelines.glass_scratches.tables import sampling
 from pipelines.glass_scratches.tables.bins import bin_centres, bin_weights
+from pipelines.glass_scratches.tables.lobe import Direction, Lobe, lobe_from_sums, make_lobe
 from pipelines.glass_scratches.tables.profiles import built_in_profile
-from pipelines.glass_scratches.tables.sampling import Direction, Lobe, lobe_of, make_lobe
-from pipelines.glass_scratches.tables.scratch_table import scratch_table
+from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ VIEWS = [(0.0, 0.0), (0.6, 0.5), (-1.0, 1.2)]
 
 
 def lobe(roughness: float, albedo: float = 0.8) -> Lobe:
-    made = scratch_table(
+    made = scratch_brdf_table(
         built_in_profile("v", 10.0, 4.0),
         bins=BINS,
         albedo=albedo,
@@ -64,7 +64,7 @@ def _values(
 def _kernel(views: Floats, lights: Floats, blur: float, found: Floats) -> None:
     for i in range(len(views)):
         for j in range(len(lights)):
-            found[i, j] = sampling.lean_kernel(views[i], lights[j], blur)
+            found[i, j] = sampling.theta_kernel(views[i], lights[j], blur)
 
 
 def direction(theta: Floats | float, phi: Floats | float) -> Floats:
@@ -225,19 +225,19 @@ def test_the_quantile_is_the_integral_of_the_squared_cosine() -> None:
     theta = np.linspace(-np.pi / 2, np.pi / 2, 20_001)
     middles = (theta[1:] + theta[:-1]) / 2
     running = np.cumsum(np.cos(middles) ** 2) * (theta[1] - theta[0]) * 2 / np.pi
-    found = [sampling.quantile(float(np.sin(t))) for t in theta[1::500]]
+    found = [sampling.theta_quantile(float(np.sin(t))) for t in theta[1::500]]
     np.testing.assert_allclose(found, running[::500], atol=1e-7)
-    assert (sampling.quantile(-1.0), sampling.quantile(0.0)) == (0.0, 0.5)
-    assert sampling.quantile(1.0 + 1e-9) == sampling.quantile(1.0) == 1.0
+    assert (sampling.theta_quantile(-1.0), sampling.theta_quantile(0.0)) == (0.0, 0.5)
+    assert sampling.theta_quantile(1.0 + 1e-9) == sampling.theta_quantile(1.0) == 1.0
 
 
 def test_the_lean_of_a_quantile_is_found_again() -> None:
     shares = np.concatenate([np.linspace(0, 1, 401), [1e-12, 1e-8, 1e-4, 1 - 1e-4, 1 - 1e-9]])
-    sines = np.array([sampling.lean_sine(c) for c in shares])
-    np.testing.assert_allclose([sampling.quantile(s) for s in sines], shares, atol=1e-12)
+    sines = np.array([sampling.sine_of_quantile(c) for c in shares])
+    np.testing.assert_allclose([sampling.theta_quantile(s) for s in sines], shares, atol=1e-12)
     assert (np.diff(sines[:401]) > 0).all()
     inner = np.sin(np.linspace(-1.5, 1.5, 101))
-    again = [sampling.lean_sine(sampling.quantile(s)) for s in inner]
+    again = [sampling.sine_of_quantile(sampling.theta_quantile(s)) for s in inner]
     np.testing.assert_allclose(again, inner, atol=1e-9)
 
 
@@ -283,7 +283,7 @@ def test_the_blur_of_a_lobe_is_half_that_of_a_bounce() -> None:
     assert make_lobe(across, 0.5).blur == pytest.approx(0.5)
     assert make_lobe(across, 0.0).blur == 0.01
     again = make_lobe(across, 0.5)
-    kept = lobe_of(across, again.cdf, again.share, 0.5)
+    kept = lobe_from_sums(across, again.cdf, again.share, 0.5)
     for one, other in zip(again, kept, strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_allclose(np.diff(np.arcsin(kept.sines)), np.pi / 8)

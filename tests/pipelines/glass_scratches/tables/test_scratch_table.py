@@ -11,20 +11,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_centres
-from pipelines.glass_scratches.tables.exact import exchange, leaving_share, solve
+from pipelines.glass_scratches.tables.fresnel import (
+    TABULATED_THETA,
+    Fresnel,
+    fresnel_factors,
+    interpolated_fresnel,
+    interpolation_error,
+    schlick,
+)
 from pipelines.glass_scratches.tables.monte_carlo import PLACES
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
-from pipelines.glass_scratches.tables.scratch_table import (
-    LEANS,
-    Fresnel,
-    Method,
-    Table2D,
-    interpolated_factor,
-    interpolation_error,
-    lean_factors,
-    schlick,
-    scratch_table,
-)
+from pipelines.glass_scratches.tables.radiosity import leaving_share, solve_radiosity, view_factors
+from pipelines.glass_scratches.tables.scratch_table import Method, Table2D, scratch_brdf_table
 
 BINS = 16
 PAPERS_GAMMA = math.log(1 / 32) / math.log(2 / 3)
@@ -37,7 +35,7 @@ indices = st.floats(1.01, 3.0)
 def made(
     profile: NDArray[np.float64], method: Method, *, roughness: float = 1.0, albedo: float = 0.8
 ) -> Table2D:
-    return scratch_table(
+    return scratch_brdf_table(
         profile,
         bins=BINS,
         albedo=albedo,
@@ -76,7 +74,7 @@ def test_an_index_that_is_not_positive_is_refused(index: float) -> None:
         schlick(index, np.array([1.0]))
     for variant in ("paper", "physical"):
         with pytest.raises(ValueError, match=message):
-            lean_factors(8, index, variant)
+            fresnel_factors(8, index, variant)
 
 
 # ---- gamma and the interpolation -------------------------------------------------------------
@@ -84,7 +82,7 @@ def test_an_index_that_is_not_positive_is_refused(index: float) -> None:
 
 @given(indices, st.sampled_from([8, 10, 64]))
 def test_the_papers_gamma_is_one_number(index: float, bins: int) -> None:
-    lean = lean_factors(bins, index, "paper")
+    lean = fresnel_factors(bins, index, "paper")
     assert lean.gamma.shape == (bins,)
     np.testing.assert_allclose(lean.gamma, PAPERS_GAMMA, rtol=1e-12)
     assert pytest.approx(8.5476, abs=5e-5) == PAPERS_GAMMA
@@ -94,29 +92,29 @@ def test_the_papers_gamma_is_one_number(index: float, bins: int) -> None:
 
 def test_gamma_needs_no_glass() -> None:
     """Index 1 reflects nothing head-on; the exponent stays."""
-    np.testing.assert_allclose(lean_factors(8, 1.0, "paper").gamma, PAPERS_GAMMA)
-    physical = lean_factors(8, 1.0, "physical").gamma
-    np.testing.assert_allclose(physical, lean_factors(8, 1.7, "physical").gamma, rtol=1e-12)
+    np.testing.assert_allclose(fresnel_factors(8, 1.0, "paper").gamma, PAPERS_GAMMA)
+    physical = fresnel_factors(8, 1.0, "physical").gamma
+    np.testing.assert_allclose(physical, fresnel_factors(8, 1.7, "physical").gamma, rtol=1e-12)
 
 
 @given(indices, st.sampled_from(["paper", "physical"]))
 def test_the_interpolation_is_exact_where_the_table_is(index: float, variant: Fresnel) -> None:
     bins = 32
-    lean = lean_factors(bins, index, variant)
+    lean = fresnel_factors(bins, index, variant)
     flat = np.ones(bins) if variant == "paper" else np.cos(bin_centres(bins))
-    found = interpolated_factor(lean, np.array([0.0, np.pi / 3, np.pi / 2]))
+    found = interpolated_fresnel(lean, np.array([0.0, np.pi / 3, np.pi / 2]))
     expected = np.stack([schlick(index, c * flat) for c in (1.0, 0.5, 0.0)])
     np.testing.assert_allclose(found, expected, rtol=1e-9)
     np.testing.assert_allclose(lean.factor, expected, rtol=1e-9)
     np.testing.assert_allclose(
-        interpolated_factor(lean, np.array([-np.pi / 3])), found[1:2], rtol=1e-12
+        interpolated_fresnel(lean, np.array([-np.pi / 3])), found[1:2], rtol=1e-12
     )
-    assert (0.0, np.pi / 3, np.pi / 2) == LEANS
+    assert (0.0, np.pi / 3, np.pi / 2) == TABULATED_THETA
 
 
 def test_the_physical_gamma_follows_equation_4() -> None:
     bins, index = 8, 1.5
-    lean = lean_factors(bins, index, "physical")
+    lean = fresnel_factors(bins, index, "physical")
     low, middle, high = lean.factor
     quotient = (middle - low) / (high - low)
     np.testing.assert_allclose(lean.gamma, np.log(quotient) / np.log(2 / 3), rtol=1e-9)
@@ -159,7 +157,7 @@ def test_the_physical_interpolation_has_an_error_for_every_phi() -> None:
 @pytest.mark.parametrize("profile", [V, W], ids=["v", "w"])
 def test_the_exact_table_is_the_solved_one(profile: NDArray[np.float64]) -> None:
     found = made(profile, "exact")
-    solved = solve(exchange(profile, BINS, 80), 0.8)
+    solved = solve_radiosity(view_factors(profile, BINS, 80), 0.8)
     np.testing.assert_array_equal(found.rho, solved.rho)
     np.testing.assert_array_equal(found.absorbed, solved.absorbed)
     np.testing.assert_array_equal(found.standard_error, 0.0)

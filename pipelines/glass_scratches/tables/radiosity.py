@@ -4,8 +4,8 @@ The paper shoots rays (section 3.1); with Lambertian walls of albedo a the same 
 
     rho_m = (pi / 2) a W E^T (L - a S)^-1 E
 
-where W is the width of the opening, L the lengths of the facets, S = L F their exchange (F: view
-factors in the plane) and E[j, k] the part of a beam from bin k that meets facet j first, averaged
+where W is the width of the opening, L the lengths of the facets, F their view factors in the plane,
+S = L F, and E[j, k] the part of a beam from bin k that meets facet j first, averaged
 over the bin (weighted by the cosine). L - a S is symmetric and positive definite, so with its
 Cholesky factor the table is Y^T Y: reciprocal by construction.
 
@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_centres, bin_edges, bin_weights
 from pipelines.glass_scratches.tables.facets import facet_ends, taut_strings
+from pipelines.glass_scratches.tables.walls import check_albedo
 
 
-class Exchange(NamedTuple):
-    """Who lights whom in a profile of J facets, for M bins.
+class ViewFactors(NamedTuple):
+    """How much of each other the J facets of a profile see, and of the beams of M bins.
 
     ``lengths`` (J,); ``facets`` (J, J): L F, symmetric; ``opening`` (J,): the same to the opening;
     ``entering`` (J, M): part of a bin's beam that meets the facet first; ``width``: of the opening.
@@ -53,7 +54,7 @@ class ExactTable(NamedTuple):
     radiosity: NDArray[np.float64]
 
 
-def exchange(profile: NDArray[np.float64], bins: int, facets: int) -> Exchange:
+def view_factors(profile: NDArray[np.float64], bins: int, facets: int) -> ViewFactors:
     """All factors of a profile (P, 2) cut into about ``facets`` facets."""
     ends = facet_ends(profile, facets)
     strings = taut_strings(profile, ends, bin_edges(bins))
@@ -64,7 +65,7 @@ def exchange(profile: NDArray[np.float64], bins: int, facets: int) -> Exchange:
     received = far[1:, :-1] + far[:-1, 1:] - far[1:, 1:] - far[:-1, :-1]
     width = float(ends[-1, 0] - ends[0, 0])
     step = np.diff(ends, axis=0)
-    return Exchange(
+    return ViewFactors(
         ends,
         np.hypot(step[:, 0], step[:, 1]),
         (between + between.T) / 2,
@@ -74,24 +75,27 @@ def exchange(profile: NDArray[np.float64], bins: int, facets: int) -> Exchange:
     )
 
 
-def solve(lit: Exchange, albedo: float) -> ExactTable:
-    """The table of walls with an albedo in [0, 1]. Raises ValueError outside."""
+def solve_radiosity(factors: ViewFactors, albedo: float) -> ExactTable:
+    """The table of walls with an albedo in [0, 1]. Raises ValueError outside.
+
+    >>> from pipelines.glass_scratches.tables.profiles import built_in_profile
+    >>> groove = built_in_profile("v", width=10.0, depth=4.0)
+    >>> white = solve_radiosity(view_factors(groove, bins=16, facets=20), albedo=1.0)
+    >>> white.rho.shape
+    (16, 16)
+    >>> bool(np.allclose(leaving_share(white.rho), 1.0))  # all light comes out again
+    True
+    """
     from scipy.linalg import cholesky, solve_triangular
 
     check_albedo(albedo)
-    factor = cholesky(np.diag(lit.lengths) - albedo * lit.facets, lower=True)
-    half = solve_triangular(factor, lit.entering, lower=True)
+    lower = cholesky(np.diag(factors.lengths) - albedo * factors.facets, lower=True)
+    half = solve_triangular(lower, factors.entering, lower=True)
     rho = half.T @ half
-    scale = np.pi / 2 * albedo * lit.width
-    arriving = solve_triangular(factor, half, lower=True, trans="T")
-    absorbed = (1 - albedo) * (lit.lengths @ arriving)
+    scale = np.pi / 2 * albedo * factors.width
+    arriving = solve_triangular(lower, half, lower=True, trans="T")
+    absorbed = (1 - albedo) * (factors.lengths @ arriving)
     return ExactTable(scale * rho, absorbed, scale * arriving)
-
-
-def check_albedo(albedo: float) -> None:
-    """Raises ValueError for an albedo outside [0, 1]."""
-    if not 0.0 <= albedo <= 1.0:
-        raise ValueError(f"albedo is {albedo:g}; expected 0 to 1.")
 
 
 def equation_1(rho: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,11 +110,11 @@ def leaving_share(rho: NDArray[np.float64]) -> NDArray[np.float64]:
     return bin_weights(len(rho)) @ rho / np.pi
 
 
-def seen_facets(lit: Exchange, bins: int, places: int) -> NDArray[np.int64]:
+def seen_facets(factors: ViewFactors, bins: int, places: int) -> NDArray[np.int64]:
     """The facet seen at each of ``places`` points across the opening from each bin's middle,
     (places, bins); places count from the left end, at the middles of equal parts."""
-    ends = lit.ends
-    across = ends[0, 0] + lit.width * (np.arange(places) + 0.5) / places
+    ends = factors.ends
+    across = ends[0, 0] + factors.width * (np.arange(places) + 0.5) / places
     seen = np.zeros((places, bins), np.int64)
     start, step = ends[:-1], np.diff(ends, axis=0)
     for column, angle in enumerate(bin_centres(bins)):

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pipelines.glass_scratches.tables.bins import bin_centres, bin_edges, bin_weights
-from pipelines.glass_scratches.tables.exact import (
-    Exchange,
-    equation_1,
-    exchange,
-    leaving_share,
-    seen_facets,
-    solve,
-)
 from pipelines.glass_scratches.tables.facets import facet_ends, taut_strings
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
+from pipelines.glass_scratches.tables.radiosity import (
+    ViewFactors,
+    equation_1,
+    leaving_share,
+    seen_facets,
+    solve_radiosity,
+    view_factors,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -41,8 +41,8 @@ BINS, FACETS = 64, 40
 
 
 @pytest.fixture(scope="module", params=PROFILES)
-def lit(request: pytest.FixtureRequest) -> Exchange:
-    return exchange(PROFILES[request.param], BINS, FACETS)
+def lit(request: pytest.FixtureRequest) -> ViewFactors:
+    return view_factors(PROFILES[request.param], BINS, FACETS)
 
 
 # ---- rays ------------------------------------------------------------------------------------
@@ -127,7 +127,7 @@ def test_a_string_around_the_hump_of_a_w() -> None:
 
 @pytest.mark.parametrize(("width", "depth"), [(10.0, 4.0), (2.0, 9.0), (10.0, 0.5)])
 def test_the_walls_of_a_v_exchange_what_crossed_strings_say(width: float, depth: float) -> None:
-    lit = exchange(built_in_profile("v", width, depth), 16, 24)
+    lit = view_factors(built_in_profile("v", width, depth), 16, 24)
     side = math.hypot(width / 2, depth)
     left = lit.ends[1:, 0] <= 1e-12
     expected = (2 * side - width) / 2
@@ -137,7 +137,7 @@ def test_the_walls_of_a_v_exchange_what_crossed_strings_say(width: float, depth:
 
 
 def test_the_sides_of_a_trapezoid_exchange_what_crossed_strings_say() -> None:
-    lit = exchange(PROFILES["trapezoid"], 16, 30)
+    lit = view_factors(PROFILES["trapezoid"], 16, 30)
     low = lit.ends[:, 1] <= -3.0 + 1e-12
     bottom = low[1:] & low[:-1]
     left = ~bottom & (lit.ends[1:, 0] < 0)
@@ -158,7 +158,7 @@ def test_the_sides_of_a_trapezoid_exchange_what_crossed_strings_say() -> None:
 @pytest.mark.parametrize("name", CONVEX)
 def test_facets_that_see_each_other_exchange_the_integral_of_their_cosines(name: str) -> None:
     """Gauss's quadrature of cos cos / (2 r) over pairs of facets that do not touch."""
-    lit = exchange(PROFILES[name], 16, 16)
+    lit = view_factors(PROFILES[name], 16, 16)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     step = np.diff(lit.ends, axis=0)
     way = step / lit.lengths[:, None]
@@ -176,7 +176,7 @@ def test_facets_that_see_each_other_exchange_the_integral_of_their_cosines(name:
     assert compared > 10
 
 
-def test_nothing_is_lost_between_facets_and_opening(lit: Exchange) -> None:
+def test_nothing_is_lost_between_facets_and_opening(lit: ViewFactors) -> None:
     total = lit.facets.sum(axis=1) + lit.opening
     np.testing.assert_allclose(total, lit.lengths, rtol=1e-12, atol=1e-12)
     assert lit.opening.sum() == pytest.approx(lit.width, rel=1e-12)
@@ -186,13 +186,13 @@ def test_nothing_is_lost_between_facets_and_opening(lit: Exchange) -> None:
     np.testing.assert_array_equal(np.diag(lit.facets), 0.0)
 
 
-def test_every_beam_meets_the_walls_entirely(lit: Exchange) -> None:
+def test_every_beam_meets_the_walls_entirely(lit: ViewFactors) -> None:
     assert lit.entering.shape == (len(lit.lengths), BINS)
     assert lit.entering.min() >= -1e-11
     np.testing.assert_allclose(lit.entering.sum(axis=0), 1.0, atol=1e-11)
 
 
-def test_light_from_everywhere_enters_as_the_opening_sends_it(lit: Exchange) -> None:
+def test_light_from_everywhere_enters_as_the_opening_sends_it(lit: ViewFactors) -> None:
     """All beams together are an evenly bright opening: W E w / 2 is what it exchanges."""
     sent = lit.width * lit.entering @ bin_weights(BINS) / 2
     np.testing.assert_allclose(sent, lit.opening, atol=1e-11)
@@ -201,7 +201,7 @@ def test_light_from_everywhere_enters_as_the_opening_sends_it(lit: Exchange) -> 
 @pytest.mark.parametrize("name", BENT)
 def test_view_factors_are_where_rays_go(name: str) -> None:
     rays = 6000
-    lit = exchange(PROFILES[name], 8, 24)
+    lit = view_factors(PROFILES[name], 8, 24)
     rng = np.random.default_rng(1)
     step = np.diff(lit.ends, axis=0) / lit.lengths[:, None]
     found, hidden = [], 0
@@ -222,7 +222,7 @@ def test_view_factors_are_where_rays_go(name: str) -> None:
 @pytest.mark.parametrize("name", ["w", "keyhole"])
 def test_beams_meet_the_facets_that_rays_meet(name: str) -> None:
     rays, bins = 20_000, 16
-    lit = exchange(PROFILES[name], bins, 24)
+    lit = view_factors(PROFILES[name], bins, 24)
     edges = np.sin(bin_edges(bins))
     rng = np.random.default_rng(2)
     found = []
@@ -240,7 +240,7 @@ def test_beams_meet_the_facets_that_rays_meet(name: str) -> None:
 
 @pytest.mark.parametrize("name", PROFILES)
 def test_the_facets_seen_are_those_that_rays_meet(name: str) -> None:
-    lit = exchange(PROFILES[name], 32, FACETS)
+    lit = view_factors(PROFILES[name], 32, FACETS)
     places = 101
     seen = seen_facets(lit, 32, places)
     v = lit.ends[0, 0] + lit.width * (np.arange(places) + 0.5) / places
@@ -259,8 +259,8 @@ def test_the_facets_seen_are_those_that_rays_meet(name: str) -> None:
 # ---- the table -------------------------------------------------------------------------------
 
 
-def test_white_walls_keep_nothing_and_swap_light_and_view(lit: Exchange) -> None:
-    solved = solve(lit, 1.0)
+def test_white_walls_keep_nothing_and_swap_light_and_view(lit: ViewFactors) -> None:
+    solved = solve_radiosity(lit, 1.0)
     np.testing.assert_allclose(leaving_share(solved.rho), 1.0, atol=1e-10)
     np.testing.assert_allclose(solved.rho, solved.rho.T, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(solved.absorbed, 0.0)
@@ -268,15 +268,15 @@ def test_white_walls_keep_nothing_and_swap_light_and_view(lit: Exchange) -> None
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.05, 0.6, 0.99])
-def test_what_does_not_leave_stays(lit: Exchange, albedo: float) -> None:
-    solved = solve(lit, albedo)
+def test_what_does_not_leave_stays(lit: ViewFactors, albedo: float) -> None:
+    solved = solve_radiosity(lit, albedo)
     np.testing.assert_allclose(leaving_share(solved.rho) + solved.absorbed, 1.0, atol=1e-10)
     assert (solved.absorbed > 0).all()
     # Every beam is met at least once.
     assert (solved.absorbed >= 1 - albedo - 1e-12).all()
 
 
-def test_the_table_is_the_sum_over_bounces(lit: Exchange) -> None:
+def test_the_table_is_the_sum_over_bounces(lit: ViewFactors) -> None:
     """Bounce by bounce, without a linear system: 60 of them at albedo 0.6 are enough."""
     albedo = 0.6
     arriving = lit.entering
@@ -289,7 +289,7 @@ def test_the_table_is_the_sum_over_bounces(lit: Exchange) -> None:
         kept += (1 - albedo) * arriving.sum(axis=0)
         leaving += albedo * out.T @ arriving
         arriving = spread @ arriving
-    solved = solve(lit, albedo)
+    solved = solve_radiosity(lit, albedo)
     rho = leaving * np.pi / bin_weights(BINS)[:, None]
     np.testing.assert_allclose(solved.rho, rho, rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(solved.absorbed, kept, rtol=1e-9)
@@ -299,7 +299,7 @@ def test_the_table_is_the_sum_over_bounces(lit: Exchange) -> None:
 def test_dark_walls_scatter_once(name: str) -> None:
     """rho / albedo tends to (pi / 2) W sum E E / L, here with E counted from rays on a grid."""
     bins, albedo = 16, 1e-7
-    lit = exchange(PROFILES[name], bins, 16)
+    lit = view_factors(PROFILES[name], bins, 16)
     edges = np.sin(bin_edges(bins))
     places, ways = 800, 40
     v = lit.ends[0, 0] + lit.width * (np.arange(places) + 0.5) / places
@@ -311,14 +311,14 @@ def test_dark_walls_scatter_once(name: str) -> None:
         met = first_facet(lit.ends, start, way)
         counted[:, column] = np.bincount(met[met >= 0], minlength=len(counted)) / len(met)
     once = np.pi / 2 * lit.width * counted.T @ (counted / lit.lengths[:, None])
-    rho = solve(lit, albedo).rho / albedo
+    rho = solve_radiosity(lit, albedo).rho / albedo
     np.testing.assert_allclose(rho, once, rtol=0.01, atol=2e-3 * once.max())
     assert once.max() > 1.5 * once.min()
 
 
-def test_the_radiosity_seen_is_the_table(lit: Exchange) -> None:
+def test_the_radiosity_seen_is_the_table(lit: ViewFactors) -> None:
     """The mean over the opening of what is seen from a bin: at its middle, so nearly rho."""
-    solved = solve(lit, 0.8)
+    solved = solve_radiosity(lit, 0.8)
     shown = solved.radiosity[seen_facets(lit, BINS, 512)].mean(axis=0)
     steep = np.abs(bin_centres(BINS)) < math.radians(75)  # beyond, a bin is not like its middle
     kept = np.ix_(steep, steep)
@@ -328,15 +328,17 @@ def test_the_radiosity_seen_is_the_table(lit: Exchange) -> None:
     assert error.max() < 0.08
 
 
-def test_the_mean_radiosity_weighted_by_the_beam_is_the_table_exactly(lit: Exchange) -> None:
-    solved = solve(lit, 0.8)
+def test_the_mean_radiosity_weighted_by_the_beam_is_the_table_exactly(lit: ViewFactors) -> None:
+    solved = solve_radiosity(lit, 0.8)
     np.testing.assert_allclose(lit.entering.T @ solved.radiosity, solved.rho, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["v", "trapezoid", *BENT])
 def test_more_facets_change_less_and_less(name: str) -> None:
     """Within 70 degrees: light that grazes the border needs facets as fine as its spot."""
-    tables = [solve(exchange(PROFILES[name], 16, n), 0.9).rho for n in (10, 20, 40, 80, 240)]
+    tables = [
+        solve_radiosity(view_factors(PROFILES[name], 16, n), 0.9).rho for n in (10, 20, 40, 80, 240)
+    ]
     steep = np.abs(bin_centres(16)) < math.radians(70)
     fine = tables.pop()
     errors = [np.abs(rho - fine)[np.ix_(steep, steep)].max() / fine.max() for rho in tables]
@@ -350,17 +352,17 @@ def test_more_facets_change_less_and_less(name: str) -> None:
 
 def test_a_shallow_scratch_is_a_matt_plane() -> None:
     """Almost no second bounce: what leaves goes by the cosine, rho = pi a / 2."""
-    solved = solve(exchange(built_in_profile("v", 10.0, 1e-4), 16, 16), 0.7)
+    solved = solve_radiosity(view_factors(built_in_profile("v", 10.0, 1e-4), 16, 16), 0.7)
     middle = np.abs(bin_centres(16)) < math.radians(60)
     np.testing.assert_allclose(solved.rho[np.ix_(middle, middle)], 0.35 * np.pi, rtol=1e-3)
 
 
 def test_size_does_not_matter_and_mirrored_profiles_have_mirrored_tables() -> None:
     profile = PROFILES["w"]
-    rho = solve(exchange(profile, 16, 30), 0.8).rho
-    scaled = solve(exchange(profile * 1e-3, 16, 30), 0.8).rho
+    rho = solve_radiosity(view_factors(profile, 16, 30), 0.8).rho
+    scaled = solve_radiosity(view_factors(profile * 1e-3, 16, 30), 0.8).rho
     np.testing.assert_allclose(scaled, rho, rtol=1e-9)
-    mirrored = solve(exchange(profile[::-1] * [-1, 1], 16, 30), 0.8).rho
+    mirrored = solve_radiosity(view_factors(profile[::-1] * [-1, 1], 16, 30), 0.8).rho
     np.testing.assert_allclose(mirrored[::-1, ::-1], rho, rtol=1e-9)
     assert np.abs(mirrored - rho).max() > 0.01
 
@@ -368,9 +370,9 @@ def test_size_does_not_matter_and_mirrored_profiles_have_mirrored_tables() -> No
 # ---- Eq. 1 -----------------------------------------------------------------------------------
 
 
-def test_equation_1_counts_m_over_n_cos_for_each_path(lit: Exchange) -> None:
+def test_equation_1_counts_m_over_n_cos_for_each_path(lit: ViewFactors) -> None:
     """Drawn paths, each of which adds M / (N cos phi_o), agree within their noise."""
-    rho, paths = solve(lit, 0.9).rho, 40_000
+    rho, paths = solve_radiosity(lit, 0.9).rho, 40_000
     rng = np.random.default_rng(3)
     cosine = np.cos(bin_centres(BINS))
     share = rho * bin_weights(BINS)[:, None] / np.pi
@@ -414,11 +416,11 @@ def test_bins_that_are_odd_or_few_are_refused(bins: int) -> None:
     with pytest.raises(ValueError, match=message):
         bin_edges(bins)
     with pytest.raises(ValueError, match=message):
-        exchange(PROFILES["v"], bins, 8)
+        view_factors(PROFILES["v"], bins, 8)
 
 
 @pytest.mark.parametrize("albedo", [-0.01, 1.01, math.nan, math.inf])
 def test_an_albedo_outside_0_to_1_is_refused(albedo: float) -> None:
-    lit = exchange(PROFILES["v"], 8, 4)
+    lit = view_factors(PROFILES["v"], 8, 4)
     with pytest.raises(ValueError, match=rf"^albedo is {albedo:g}; expected 0 to 1\.$"):
-        solve(lit, albedo)
+        solve_radiosity(lit, albedo)

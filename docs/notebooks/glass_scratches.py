@@ -1,0 +1,32 @@
+"""Scratched glass: cells of a notebook, from a cross-section to a picture (docs/scratches.md)."""
+
+# %% [markdown]
+# A scratch is a groove. What its walls do to light is a table; scratches with that table lie on a
+# tile, the tile is laid on a solid of glass, and paths of light are traced through it.
+
+# %%
+import matplotlib.pyplot as plt
+
+from pipelines.geometry.solid_shapes import plate
+from pipelines.glass_scratches import scratched_glass as glass
+from pipelines.glass_scratches.drawing import frames
+from pipelines.glass_scratches.layers import scratch_layers, settings
+from pipelines.glass_scratches.tables import profiles, scratch_table
+from pipelines.light import built_in_environments, environment_sampling
+
+# %% [markdown]
+# A V with diffuse walls, 10 µm wide and 4 deep; four layers of such scratches; a plate with them.
+
+# %%
+table = scratch_table.scratch_brdf_table(profiles.built_in_profile("v", 10.0, 4.0), bins=64)
+layers = scratch_layers.make_layers(settings.LayerSpec(length=0.6, width=0.01), seed=3)
+pane = glass.scratched_glass(plate(1.5, 1.1, 0.05), glass.scratch_material(table, layers))
+
+# %% [markdown]
+# A hand's breadth from the plate, among lamps: 16 paths of light a pixel.
+
+# %%
+lamps = environment_sampling.make_environment_sampler(built_in_environments.lamps(256))
+traced = frames.trace_view(pane, lamps, frames.object_cameras(pane.solid)[1], size=180, samples=16)
+plt.imshow(frames.exposed(traced.radiance, lamps))
+plt.show()
