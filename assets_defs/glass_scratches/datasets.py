@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipelines.glass_scratches.scratched_glass import ScratchMaterial
     from pipelines.glass_scratches.tables.fresnel import FresnelFactors
     from pipelines.glass_scratches.tables.lobe import Lobe
-    from pipelines.glass_scratches.tables.scratch_table import Table2D
+    from pipelines.glass_scratches.tables.table_2d import Table2D
 
 
 def table_2d_dataset(table: Table2D, method: str, roughness: float) -> xr.Dataset:
@@ -38,7 +38,7 @@ def table_2d_dataset(table: Table2D, method: str, roughness: float) -> xr.Datase
 
 def table_2d_of(dataset: xr.Dataset) -> Table2D:
     """The table that a `scratch_table_2d` dataset holds."""
-    from pipelines.glass_scratches.tables.scratch_table import Table2D
+    from pipelines.glass_scratches.tables.table_2d import Table2D
 
     return Table2D(*(dataset[name].values for name in Table2D._fields))
 
@@ -199,9 +199,10 @@ def _lobe(version: StoredVersion) -> Lobe:
 
 
 LOADERS: dict[str, Callable[[StoredVersion], object]] = {
+    "scratch_profile": lambda version: version.dataset["points"].values,
     "scratch_table_2d": lambda version: table_2d_of(version.dataset),
     "scratch_table": _lobe,
     "scratch_layers": lambda version: layers_of(version.dataset),
     "glass_object": lambda version: solid_of(version.dataset),
 }
-"""What `tsuya.load` gives of an asset: Table2D, Lobe, Layers, Solid."""
+"""What `tsuya.load` gives of an asset: points (P, 2), Table2D, Lobe, Layers, Solid."""

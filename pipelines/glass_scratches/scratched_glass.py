@@ -17,7 +17,7 @@ from pipelines.glass_scratches.tables.lobe import Lobe, make_lobe
 
 if TYPE_CHECKING:
     from pipelines.geometry.solids import Solid
-    from pipelines.glass_scratches.tables.scratch_table import Table2D
+    from pipelines.glass_scratches.tables.table_2d import Table2D
 
 
 class ScratchMaterial(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +13,12 @@ from pipelines.glass_scratches.tables.radiosity import (
     solve_radiosity,
     view_factors,
 )
+from pipelines.glass_scratches.tables.table_2d import Table2D
 from pipelines.glass_scratches.tables.walls import check_roughness
 
 Method = Literal["exact", "paths"]
 
 _FINE = 16
-
-
-class Table2D(NamedTuple):
-    """One profile's table: rows are the bins of phi_o, columns those of phi_i.
-
-    ``rho`` (M, M) float64; ``standard_error`` (M, M) float64, 0 for the exact one; ``absorbed``
-    (M,) float64, part of each bin's beam that stays; ``across`` (places, M, M) float32: rho by the
-    place at which the view's ray enters the opening, from its left end, rows being the view: its
-    mean is rho transposed, which is rho but for the paths' noise.
-    """
-
-    rho: NDArray[np.float64]
-    standard_error: NDArray[np.float64]
-    absorbed: NDArray[np.float64]
-    across: NDArray[np.float32]
 
 
 def scratch_brdf_table(

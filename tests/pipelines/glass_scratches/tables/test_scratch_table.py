@@ -22,7 +22,8 @@ from pipelines.glass_scratches.tables.fresnel import (
 from pipelines.glass_scratches.tables.monte_carlo import PLACES
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
 from pipelines.glass_scratches.tables.radiosity import leaving_share, solve_radiosity, view_factors
-from pipelines.glass_scratches.tables.scratch_table import Method, Table2D, scratch_brdf_table
+from pipelines.glass_scratches.tables.scratch_table import Method, scratch_brdf_table
+from pipelines.glass_scratches.tables.table_2d import Table2D
 
 BINS = 16
 PAPERS_GAMMA = math.log(1 / 32) / math.log(2 / 3)
