@@ -18,8 +18,8 @@ from assets_defs.partitions import keys_of_partition
 from assets_defs.provenance import provenance
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
-from storage.errors import SchemaError
-from storage.io_manager import INTERRUPTED
+from storage.errors import DamagedError, StoreError
+from storage.io_manager import INTERRUPTED, damage_failure
 from storage.stored_version import StoredVersion
 from storage.versions import VersionedStore
 from storage.zarr_files import RECORD
@@ -127,7 +127,9 @@ def _materialise(
     except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
         # Left to itself, Dagster would take the interruption for trouble and try again.
         raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
-    except (ValueError, SchemaError) as error:
+    except DamagedError as error:
+        raise damage_failure(workspace.store, error) from error
+    except (ValueError, StoreError) as error:
         # What the user gave cannot work: a second try would not either.
         raise dg.Failure(description=str(error), allow_retries=False) from error
     record = made_of | {
@@ -169,6 +171,9 @@ def _evaluated(check: Check, version: StoredVersion) -> dg.AssetCheckResult:
     metadata: dict[str, Any] = {"version": version.version}
     try:
         figure = check.figure(version)
+    except DamagedError as error:
+        # No verdict on this version: what was read is not what was checked, or made from.
+        raise damage_failure(store, error) from error
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         store.reject(slot, version.version, check.name, reason)

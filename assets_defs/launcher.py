@@ -18,11 +18,15 @@ from assets_defs.provenance import provenance
 from assets_defs.settings import Settings, resolve
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
-from storage.io_manager import INTERRUPTED
+from storage.errors import DamagedError
+from storage.io_manager import DAMAGED, INTERRUPTED
 from storage.versions import Slot
 
 _QUIET = {"console": {"config": {"log_level": "CRITICAL"}}}
 """The instance keeps every event; a terminal shows the progress and the outcome."""
+
+_MOST_DAMAGED = 20
+"""So often a launch starts again because it met damaged versions."""
 
 JobByName = Callable[[str], dg.JobDefinition]
 LaunchProgress = Callable[[str, float], None]
@@ -67,6 +71,10 @@ class _RunError(Exception):
     """One run failed; the text says why."""
 
 
+class _DamageMetError(Exception):
+    """A run read damaged bytes. They are out of use now: what they were is to be made again."""
+
+
 @dataclass(frozen=True)
 class Launcher:
     """Launches requests on one Dagster instance and one store."""
@@ -85,9 +93,26 @@ class Launcher:
 
         An interruption (Ctrl-C) ends the run at work and the launch: KeyboardInterrupt.
         Every source is read and every setting is checked before the first run starts. Where a run
-        fails, what is made from it is left out, and the rest goes on. ``show`` is told what there
-        is of each partition of a grain as soon as it is there.
+        fails, what is made from it is left out, and the rest goes on. What turns out to be damaged
+        in the store is made again. ``show`` is told what there is of each partition of a grain as
+        soon as it is there.
         """
+        for _ in range(_MOST_DAMAGED):
+            try:
+                return self._launch(request, show)
+            except DamagedError as damage:
+                self.workspace.store.discard(damage)
+            except _DamageMetError:
+                continue
+        raise LaunchError(
+            [
+                f"{request.system.name}: {_MOST_DAMAGED} damaged versions were met; expected few. "
+                "`tsuya verify` lists them: look at the disk."
+            ],
+            [],
+        )
+
+    def _launch(self, request: Request, show: Callable[[Sequence[Outcome]], None]) -> list[Outcome]:
         planned = self._plan(request)
         for dimension in request.system.dimensions:
             name = request.system.partitions_name(dimension.name)
@@ -180,6 +205,8 @@ class Launcher:
             asset_selection=[dg.AssetKey([system.name, name]) for name in stale],
         )
         if not result.success:
+            if _met_damage(result):
+                raise _DamageMetError
             why = _why(result)
             if why == INTERRUPTED:
                 raise KeyboardInterrupt
@@ -266,6 +293,13 @@ def _given(settings: Settings) -> dict[str, Any]:
     return {
         name: value for name, value in settings.model_dump(mode="json").items() if value is not None
     }
+
+
+def _met_damage(result: dg.ExecuteInProcessResult) -> bool:
+    """Whether a step failed because of damaged bytes in the store."""
+    failures = (event.step_failure_data for event in result.all_events if event.is_step_failure)
+    said = (failure.user_failure_data for failure in failures)
+    return any(DAMAGED in data.metadata for data in said if data is not None)
 
 
 def _why(result: dg.ExecuteInProcessResult) -> str:

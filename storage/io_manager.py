@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import dagster as dg
 
+from storage.errors import DamagedError, StoreError
 from storage.schemas import find_schema
 from storage.versions import WHOLE, Slot, VersionedStore
 from storage.zarr_files import RECORD, stored_bytes
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 INTERRUPTED = "interrupted"
 """Why a run failed that a person stopped."""
+DAMAGED = "damaged"
+"""Name of a failure's metadata: the folder of the damaged version that was read."""
 
 
 class ZarrIOManager(dg.IOManager):
@@ -39,8 +42,11 @@ class ZarrIOManager(dg.IOManager):
         except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
             # Left to itself, Dagster would take the interruption for trouble and try again.
             raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
-        except ValueError as error:
-            # A lazy dataset's file turned out to be damaged: a second try would not help.
+        except DamagedError as error:
+            raise damage_failure(self.store, error) from error
+        except (ValueError, StoreError) as error:
+            # A lazy dataset's file turned out to be damaged, the disk is full: a second try at
+            # once would not help.
             raise dg.Failure(description=str(error), allow_retries=False) from error
         folder = self.store.folder(slot, written.version)
         data_version = dg.DataVersion(written.content)
@@ -58,8 +64,24 @@ class ZarrIOManager(dg.IOManager):
         )
 
     def load_input(self, context: dg.InputContext) -> xr.Dataset:
-        """The current version, lazy. Raises NoVersionError."""
-        return self.store.open(_slot(context))
+        """The current version, lazy. Raises dg.Failure, a sentence, where there is none."""
+        try:
+            return self.store.open(_slot(context))
+        except DamagedError as error:
+            raise damage_failure(self.store, error) from error
+        except StoreError as error:
+            raise dg.Failure(description=str(error), allow_retries=False) from error
+
+
+def damage_failure(store: VersionedStore, damage: DamagedError) -> dg.Failure:
+    """The failure of a step that read damaged bytes; what is damaged is out of use from now on.
+
+    Who launches again makes anew what was damaged.
+    """
+    store.discard(damage)
+    return dg.Failure(
+        description=str(damage), metadata={DAMAGED: str(damage.folder)}, allow_retries=False
+    )
 
 
 def _slot(context: Any) -> Slot:

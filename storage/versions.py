@@ -11,26 +11,25 @@
 A new version is a *candidate* until every blocking check of its asset has passed it; then it is
 promoted. So what is current has passed, whenever a process is killed. A version that fails is
 rejected: it stays for inspection, and if it was current the last good one takes its place.
-Readers resolve the pointer once and then read a folder that does not change.
+Readers resolve the pointer once and then read a folder that does not change. A version that is
+found damaged is taken out of use like a rejected one: it has not the verdict of the check `stored`.
 """
 
 from __future__ import annotations
 
-import fcntl
-import json
 import os
 import shutil
 import time
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from storage import zarr_files
-from storage.errors import NoVersionError, StoreError
+from storage.errors import DamagedError, NoVersionError, StoreError
+from storage.slot_files import Pointer, SlotFiles, Verdicts, is_slot
 from storage.work_state import WorkState
 
 if TYPE_CHECKING:
@@ -39,6 +38,9 @@ if TYPE_CHECKING:
 KEEP_VERSIONS = 5
 LEAST_AGE_SECONDS = 24 * 3600.0
 _STAMP = "%Y%m%dT%H%M%S%f"
+KEEP_VERDICTS = 200
+STORED = "stored"
+"""Name of the verdict against a version whose bytes are not those that were written."""
 WHOLE = "whole"
 """Folder of an asset that has no partitions."""
 
@@ -53,20 +55,6 @@ class Slot:
 
     def __str__(self) -> str:
         return f"{self.system}/{self.asset}/{self.partition}"
-
-
-@dataclass(frozen=True)
-class Pointer:
-    """What ``current.json`` says."""
-
-    version: str | None = None
-    """The current version; it has passed all its blocking checks."""
-    recipe: str | None = None
-    """Hash of code, settings and inputs that last produced this version's content."""
-    earlier: tuple[str, ...] = ()
-    """Good versions before the current one, newest first."""
-    candidates: tuple[str, ...] = ()
-    """Versions that wait for their checks, oldest first."""
 
 
 @dataclass(frozen=True)
@@ -95,21 +83,16 @@ class VersionedStore:
 
     # ---- reading -----------------------------------------------------------------------------
 
+    def files(self, slot: Slot) -> SlotFiles:
+        """The slot's folder."""
+        return SlotFiles(self.root / slot.system / slot.asset / slot.partition)
+
     def pointer(self, slot: Slot) -> Pointer:
-        """The slot's pointer; an empty one where nothing was ever published."""
-        path = self._folder(slot) / "current.json"
-        try:
-            fields = json.loads(path.read_text())
-        except FileNotFoundError:
-            return Pointer()
-        except ValueError as error:
-            raise StoreError(f"{path}: is not JSON ({error}); expected a pointer.") from error
-        return Pointer(
-            fields["version"],
-            fields["recipe"],
-            tuple(fields["earlier"]),
-            tuple(fields["candidates"]),
-        )
+        """The slot's pointer; an empty one where nothing was ever published.
+
+        Where it is damaged: what it must have said.
+        """
+        return self.files(slot).pointer()
 
     def current(self, slot: Slot) -> str:
         """The current version. Raises NoVersionError where there is none."""
@@ -128,8 +111,11 @@ class VersionedStore:
         A run has none of its own where its content was equal to the current version's.
         """
         for version in reversed(self.versions(slot)):
-            if self.record(slot, version).get("run") == run:
-                return version
+            try:
+                if self.record(slot, version).get("run") == run:
+                    return version
+            except DamagedError:
+                continue
         pointer = self.pointer(slot)
         if pointer.version is None and pointer.candidates:
             return pointer.candidates[-1]
@@ -138,7 +124,7 @@ class VersionedStore:
     def folder(self, slot: Slot, version: str | None = None) -> Path:
         """Folder of a version (of the current one by default): a plain Zarr v3 group."""
         found = version or self.current(slot)
-        path = self._folder(slot) / "versions" / found
+        path = self.files(slot).version_folder(found)
         if not path.is_dir():
             raise NoVersionError(f"{path}: no such version; expected one of {self.versions(slot)}.")
         return path
@@ -156,13 +142,14 @@ class VersionedStore:
 
     def versions(self, slot: Slot) -> list[str]:
         """All complete versions, oldest first: good, waiting and rejected ones."""
-        folder = self._folder(slot) / "versions"
-        return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+        return self.files(slot).versions()
 
     def slots(self) -> Iterator[Slot]:
         """Every slot that holds something, in the order of names."""
-        for path in sorted(self.root.glob("*/*/*/current.json")):
-            yield Slot(*path.parent.relative_to(self.root).parts)
+        for folder in sorted(self.root.glob("*/*/*")):
+            parts = folder.relative_to(self.root).parts
+            if not any(part.startswith(".") for part in parts) and is_slot(folder):
+                yield Slot(*parts)
 
     # ---- writing -----------------------------------------------------------------------------
 
@@ -175,7 +162,8 @@ class VersionedStore:
         then nothing that was stored has changed.
         """
         version = self._new_name(slot)
-        staged = self._folder(slot) / "staging" / version
+        files = self.files(slot)
+        staged = files.staging / version
         try:
             named = {"version": version, "partition": slot.partition}
             zarr_files.write_dataset(dataset, staged, {**record, **named})
@@ -189,7 +177,7 @@ class VersionedStore:
             )
             zarr_files.sync(staged)
             written = self._publish(slot, staged, Written(version, content, True))
-            shutil.rmtree(self._folder(slot) / "work", ignore_errors=True)
+            shutil.rmtree(files.folder / "work", ignore_errors=True)
         except OSError as error:
             raise zarr_files.disk_error(error, staged) from error
         finally:
@@ -199,51 +187,57 @@ class VersionedStore:
 
     def _publish(self, slot: Slot, staged: Path, written: Written) -> Written:
         record = zarr_files.read_record(staged)  # As JSON: a tuple among settings is a list now.
-        with self._locked(slot) as pointer:
+        files = self.files(slot)
+        with files.locked() as pointer:
             if pointer.version is not None and self._is_equal(slot, pointer.version, record):
-                self._point(slot, replace(pointer, recipe=record["recipe"]))
+                files.point(replace(pointer, recipe=record["recipe"]))
                 return Written(pointer.version, written.content, False)
-            versions = self._folder(slot) / "versions"
-            versions.mkdir(exist_ok=True)
-            os.rename(staged, versions / written.version)
+            published = files.version_folder(written.version)
+            published.parent.mkdir(exist_ok=True)
+            os.rename(staged, published)
             try:
-                zarr_files.sync_folder(versions)
+                zarr_files.sync_folder(published.parent)
                 waiting = replace(pointer, candidates=(*pointer.candidates, written.version))
-                self._point(slot, self._promoted(slot, waiting, written.version))
+                files.point(self._promoted(slot, waiting, written.version))
             except (OSError, StoreError):
                 # A full disk: what the pointer does not name must not fill it further.
-                if self.pointer(slot) == pointer:
-                    shutil.rmtree(versions / written.version, ignore_errors=True)
+                if files.pointer() == pointer:
+                    shutil.rmtree(published, ignore_errors=True)
                 raise
         return written
 
     def _is_equal(self, slot: Slot, version: str, record: Mapping[str, Any]) -> bool:
-        """Whether a version is complete and has the same content under the same settings."""
+        """Whether a version is undamaged and has the same content under the same settings."""
         try:
             now = self.record(slot, version)
-            zarr_files.verify_complete(self.folder(slot, version))
+            if any(now[name] != record[name] for name in ("content", "settings")):
+                return False
+            zarr_files.verify(self.folder(slot, version))
         except StoreError:
-            return False  # Damaged by hand: what is written now takes its place.
-        return all(now[name] == record[name] for name in ("content", "settings"))
+            return False  # What is written now takes its place.
+        return True
 
     def work(self, slot: Slot, recipe: str) -> WorkState:
         """Where work on a version of this recipe keeps its state until the version is written."""
-        return WorkState(self._folder(slot) / "work", recipe[:16])
+        return WorkState(self.files(slot).folder / "work", recipe[:16])
 
     # ---- verdicts ----------------------------------------------------------------------------
 
-    def verdicts(self, slot: Slot, version: str) -> dict[str, dict[str, Any]]:
-        """What each check said of a version: ``{check: {"passed": …, "figure": …}}``."""
-        path = self._folder(slot) / "verdicts" / f"{version}.json"
-        return dict(json.loads(path.read_text())) if path.exists() else {}
+    def verdicts(self, slot: Slot, version: str) -> Verdicts:
+        """What each check said of a version; nothing where that is damaged."""
+        try:
+            return self.files(slot).verdicts(version)
+        except DamagedError:
+            return {}
 
     def pass_version(self, slot: Slot, version: str, check: str, figure: float | None) -> None:
         """Note that a check passed; the last one that was waited for makes the version current."""
-        with self._locked(slot) as pointer:
-            self._note(slot, version, check, passed=True, figure=figure)
+        files = self.files(slot)
+        with files.locked() as pointer:
+            files.note(version, check, passed=True, figure=figure)
             promoted = self._promoted(slot, pointer, version)
             if promoted != pointer:
-                self._point(slot, promoted)
+                files.point(promoted)
 
     def reject(self, slot: Slot, version: str, check: str, reason: str) -> str | None:
         """Note that a check failed; the last good version is current again.
@@ -251,36 +245,59 @@ class VersionedStore:
         Compare-and-swap: only a pointer that names the rejected version changes. Returns the
         version that is current now.
         """
-        with self._locked(slot) as pointer:
-            self._note(slot, version, check, passed=False, figure=None, reason=reason)
+        files = self.files(slot)
+        with files.locked() as pointer:
+            files.note(version, check, passed=False, figure=None, reason=reason)
             candidates = tuple(name for name in pointer.candidates if name != version)
             earlier = tuple(name for name in pointer.earlier if name != version)
             changed = replace(pointer, candidates=candidates, earlier=earlier)
             if pointer.version == version:
                 changed = self._step_back(slot, changed)
-            self._point(slot, changed)
+            files.point(changed)
             return changed.version
 
+    def discard(self, damage: DamagedError) -> str | None:
+        """Take a version that was found damaged out of use; the last good one is current again.
+
+        Returns the version that is current now. Where a second look finds nothing wrong (another
+        process has discarded it, a cable was loose) nothing changes.
+        """
+        parts = damage.folder.relative_to(self.root).parts
+        slot, version = Slot(*parts[:3]), parts[-1]
+        try:
+            zarr_files.verify(damage.folder)
+        except DamagedError as error:
+            return self.reject(slot, version, STORED, error.what)
+        return self.pointer(slot).version
+
     def rollback(self, slot: Slot) -> str:
-        """Make the good version before the current one current again.
+        """Make the good version before the current one current again; a damaged one is passed over.
 
         Raises NoVersionError where there is none.
         """
-        with self._locked(slot) as pointer:
+        files = self.files(slot)
+        with files.locked() as pointer:
             changed = self._step_back(slot, pointer)
             if changed.version is None:
                 raise NoVersionError(
                     f"{slot}: no earlier good version; expected one to go back to."
                 )
-            self._point(slot, changed)
+            files.point(changed)
             return changed.version
 
     def _step_back(self, slot: Slot, pointer: Pointer) -> Pointer:
-        if not pointer.earlier:
-            return replace(pointer, version=None, recipe=None)
-        version, *earlier = pointer.earlier
-        recipe = self.record(slot, version)["recipe"]
-        return replace(pointer, version=version, recipe=recipe, earlier=tuple(earlier))
+        """The pointer to the newest earlier version that is undamaged, or to none."""
+        for number, version in enumerate(pointer.earlier):
+            try:
+                zarr_files.verify(self.folder(slot, version))
+            except StoreError as error:
+                what = error.what if isinstance(error, DamagedError) else str(error)
+                self.files(slot).note(version, STORED, passed=False, figure=None, reason=what)
+                continue
+            recipe = self.record(slot, version)["recipe"]
+            earlier = pointer.earlier[number + 1 :]
+            return replace(pointer, version=version, recipe=recipe, earlier=earlier)
+        return replace(pointer, version=None, recipe=None, earlier=())
 
     def _promoted(self, slot: Slot, pointer: Pointer, version: str) -> Pointer:
         """The pointer once a candidate has passed all its checks; else the same pointer.
@@ -310,25 +327,27 @@ class VersionedStore:
         nothing younger than ``least_age_seconds`` goes, so a reader or a writer that is still at
         work keeps its folder.
         """
-        folder = self._folder(slot)
-        with self._locked(slot) as pointer:
+        files = self.files(slot)
+        with files.locked() as pointer:
             named = {pointer.version, *pointer.earlier}
             kept = named.union(self.versions(slot)[-self.keep :])
             old = [
                 name
                 for name in self.versions(slot)
-                if name not in kept and self._is_old(folder / "versions" / name / "zarr.json")
+                if name not in kept and self._is_old(files.version_folder(name) / "zarr.json")
             ]
             # The pointer first: it must not name a folder that is gone.
             candidates = tuple(name for name in pointer.candidates if name not in old)
             if candidates != pointer.candidates:
-                self._point(slot, replace(pointer, candidates=candidates))
-            moved = [folder / "staging" / f"collected-{name}" for name in old]
+                files.point(replace(pointer, candidates=candidates))
+            moved = [files.staging / f"collected-{name}" for name in old]
             for name, path in zip(old, moved, strict=True):
-                os.rename(folder / "versions" / name, path)
-        staging = (folder / "staging").iterdir()
+                os.rename(files.version_folder(name), path)
+        verdicts = sorted((files.folder / "verdicts").glob("*.json"))[:-KEEP_VERDICTS]
+        gone = [path for path in verdicts if path.stem not in self.versions(slot)]
+        staging = files.staging.iterdir()
         left = [path for path in staging if path not in moved and self._is_old(path)]
-        for path in (*moved, *left):
+        for path in (*moved, *left, *gone):
             if path.is_dir():
                 shutil.rmtree(path, ignore_errors=True)
             else:
@@ -355,39 +374,3 @@ class VersionedStore:
             before = datetime.strptime(newest.partition("-")[0], _STAMP)
             now = max(now, before + timedelta(microseconds=1))
         return f"{now:{_STAMP}}-{uuid.uuid4().hex[:8]}"
-
-    def _folder(self, slot: Slot) -> Path:
-        return self.root / slot.system / slot.asset / slot.partition
-
-    @contextmanager
-    def _locked(self, slot: Slot) -> Iterator[Pointer]:
-        """Hold the slot's lock (the kernel frees it when a process dies)."""
-        folder = self._folder(slot)
-        (folder / "staging").mkdir(parents=True, exist_ok=True)
-        with (folder / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield self.pointer(slot)
-
-    def _point(self, slot: Slot, pointer: Pointer) -> None:
-        self._replace(slot, "current.json", asdict(pointer))
-
-    def _note(self, slot: Slot, version: str, check: str, **verdict: Any) -> None:
-        fields = {**self.verdicts(slot, version), check: verdict}
-        self._replace(slot, f"verdicts/{version}.json", fields)
-
-    def _replace(self, slot: Slot, name: str, fields: Mapping[str, Any]) -> None:
-        """Write aside, fsync, rename over: a reader sees the old file or the new one."""
-        path = self._folder(slot) / name
-        aside = f"{name.replace('/', '-')}.{uuid.uuid4().hex[:8]}"
-        beside = self._folder(slot) / "staging" / aside
-        try:
-            path.parent.mkdir(exist_ok=True)
-            with beside.open("w") as file:
-                json.dump(fields, file, indent=2)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(beside, path)
-            zarr_files.sync_folder(path.parent)
-        except OSError as error:
-            beside.unlink(missing_ok=True)
-            raise zarr_files.disk_error(error, path) from error

@@ -1,23 +1,28 @@
 """One dataset in one folder as plain Zarr v3: write, verify, hash, read strictly.
 
 Zarr reads an absent chunk as the fill value, silently. Here every chunk is written (empty ones
-too), counted before a version is published, and demanded when it is read.
+too), looked for before a version is published, and demanded when it is read. Each chunk ends in
+its checksum (the codec crc32c, which every reader of Zarr v3 knows), the group's ``zarr.json``
+holds hashes of the arrays' and a seal of its own bytes: a flipped bit is an error, not data.
+What was written before there were checksums is read on.
 """
 
 from __future__ import annotations
 
 import errno
 import hashlib
+import itertools
 import json
 import math
 import os
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from storage.errors import MissingChunkError, StoreError, StoreFullError
+from storage import sealed_json
+from storage.errors import DamagedError, MissingChunkError, StoreError, StoreFullError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +32,11 @@ RECORD = "tsuya"
 
 CHUNK_TARGET_BYTES = 8 * 2**20
 CHUNK_LEAST_BYTES = 2**20
-_CHUNK_KEY = re.compile(r"(?:^|/)c(?:/\d+)*$")
+_CHUNK_KEY = re.compile(r"^(.*?)/?c(?:/\d+)*$")
+_ARRAYS = "arrays"
+"""Entry of the record: the hash of each array's ``zarr.json``."""
+_CHECKSUM = {"name": "crc32c"}
+_CHECKSUM_BYTES = 4
 
 
 def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> None:
@@ -36,6 +45,7 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
     ``record`` becomes the group attribute ``tsuya``. Memory stays bounded by a few chunks a
     thread. Raises StoreFullError when the disk fills up.
     """
+    from zarr.codecs import Crc32cCodec, ZstdCodec
     from zarr.storage import LocalStore
 
     prepared = dataset.assign_attrs({RECORD: record})
@@ -47,6 +57,7 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
             prepared[name] = prepared[name].chunk(dict(zip(variable.dims, chunks, strict=True)))
         encoding[str(name)] = {
             "chunks": chunks,
+            "compressors": (ZstdCodec(level=0), Crc32cCodec()),
             "write_empty_chunks": True,
             "_FillValue": None,
         }
@@ -61,52 +72,75 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
 
 
 def add_to_record(folder: Path, **entries: Any) -> None:
-    """Add entries to the record of a group that is not published yet."""
+    """Add entries to the record of a group that is not published yet, and seal it."""
     path = folder / "zarr.json"
     metadata = json.loads(path.read_text())
+    arrays = {name: _hash((folder / name / "zarr.json").read_bytes()) for name in _arrays(folder)}
+    entries |= {_ARRAYS: arrays, sealed_json.SEAL: sealed_json.BLANK}
     metadata["attributes"][RECORD].update(entries)
-    path.write_text(json.dumps(metadata, indent=2))
+    with path.open("wb") as file:
+        sealed_json.dump(metadata, file)
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """The record of a stored group, without opening its arrays."""
+    """The record of a stored group, without opening its arrays. Raises DamagedError."""
+    record = _sealed_record(folder)
+    return {name: record[name] for name in record if name not in (_ARRAYS, sealed_json.SEAL)}
+
+
+def _sealed_record(folder: Path) -> dict[str, Any]:
+    """The record with the hashes of the arrays' metadata."""
     try:
-        metadata = json.loads((folder / "zarr.json").read_text())
-        return dict(metadata["attributes"][RECORD])
-    except (OSError, ValueError, KeyError) as error:
-        raise StoreError(
-            f"{folder / 'zarr.json'}: the version's record cannot be read ({error}); "
-            f"expected a Zarr v3 group with the attribute {RECORD!r}."
+        metadata = sealed_json.loads((folder / "zarr.json").read_bytes())
+        record = dict(metadata["attributes"][RECORD])
+        if _ARRAYS in record and sealed_json.SEAL not in record:
+            raise ValueError("its seal is lost")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DamagedError(
+            folder, f"zarr.json, the version's record, cannot be read ({error})"
         ) from error
+    return record
 
 
 def open_dataset(folder: Path) -> xr.Dataset:
-    """Open a stored group lazily; reading an absent chunk raises MissingChunkError."""
+    """Open a stored group lazily.
+
+    Raises DamagedError where metadata are not what was written; reading an absent chunk raises
+    MissingChunkError, a damaged one DamagedError, both naming it.
+    """
     import xarray as xr
     from zarr.storage import LocalStore
 
+    arrays = _verified_metadata(folder)
+    checked = frozenset(name for name, metadata in arrays.items() if _has_checksums(metadata))
     opened: xr.Dataset = xr.open_zarr(
-        _strict_store()(LocalStore(folder, read_only=True)),
+        _strict_store(folder, frozenset(arrays), checked)(LocalStore(folder, read_only=True)),
         chunks={},
         consolidated=False,
         zarr_format=3,
         mask_and_scale=False,
     )
-    return opened
+    return opened.assign_attrs({RECORD: read_record(folder)})
+
+
+def verify(folder: Path) -> None:
+    """Raise DamagedError unless all bytes of a published group are those that were written."""
+    record = read_record(folder)
+    verify_complete(folder)
+    if "content" in record and content_hash(folder) != record["content"]:
+        raise DamagedError(folder, "its content hash is not the one that was noted")
 
 
 def verify_complete(folder: Path) -> None:
-    """Raise MissingChunkError unless every chunk that the shapes demand is a file."""
-    for array_folder, metadata in _arrays(folder):
-        shape = metadata["shape"]
-        chunks = metadata["chunk_grid"]["configuration"]["chunk_shape"]
-        expected = math.prod(math.ceil(n / c) for n, c in zip(shape, chunks, strict=True))
-        # A scalar's one chunk is the file c itself.
-        stored = _files(array_folder / "c") if shape else array_folder.glob("c")
-        found = sum(1 for _ in stored)
-        if found != expected:
+    """Raise MissingChunkError unless every chunk that the shapes demand is a file with bytes."""
+    for name, metadata in _verified_metadata(folder).items():
+        expected = list(_chunk_files(folder / name, metadata))
+        lacking = [path for path in expected if not _has_bytes(path)]
+        if lacking:
             raise MissingChunkError(
-                f"{array_folder}: {found} chunks are stored; expected {expected}."
+                folder,
+                f"chunk {lacking[0].relative_to(folder)} is missing or empty "
+                f"({len(expected) - len(lacking)} of {len(expected)} chunks of {name} are there)",
             )
 
 
@@ -114,19 +148,26 @@ def content_hash(folder: Path) -> str:
     """Hash of what the arrays hold: the hash of the sorted hashes of chunks and array metadata.
 
     The dataset's own attributes count; the store's record (settings, times) does not, so two runs
-    that give the same arrays have the same hash.
+    that give the same arrays have the same hash. Checksums do not count either: they were added
+    when there were versions already. Raises DamagedError where a chunk has not its checksum.
     """
-    digests = []
-    for path in _files(folder):
-        if path == folder / "zarr.json":
-            attributes = json.loads(path.read_text())["attributes"]
-            attributes.pop(RECORD, None)
-            data = json.dumps(attributes, sort_keys=True).encode()
-        else:
-            data = path.read_bytes()
-        name = path.relative_to(folder).as_posix()
-        digests.append(f"{name}:{hashlib.sha256(data).hexdigest()}")
-    return hashlib.sha256("\n".join(sorted(digests)).encode()).hexdigest()
+    attributes = json.loads((folder / "zarr.json").read_bytes())["attributes"]
+    attributes.pop(RECORD, None)
+    digests = [f"zarr.json:{_hash(json.dumps(attributes, sort_keys=True).encode())}"]
+    for name in _arrays(folder):
+        path = folder / name / "zarr.json"
+        metadata = json.loads(path.read_bytes())
+        checked = _has_checksums(metadata)
+        plain = _without_checksums(metadata) if checked else path.read_bytes()
+        digests.append(f"{name}/zarr.json:{_hash(plain)}")
+        for chunk in _chunk_files(folder / name, metadata):
+            data = memoryview(chunk.read_bytes())
+            key = chunk.relative_to(folder).as_posix()
+            if checked:
+                _check_chunk(folder, key, data)
+                data = data[:-_CHECKSUM_BYTES]
+            digests.append(f"{key}:{_hash(data)}")
+    return _hash("\n".join(sorted(digests)).encode())
 
 
 def stored_bytes(folder: Path) -> int:
@@ -172,11 +213,62 @@ def _files(folder: Path) -> Iterator[Path]:
             yield Path(parent) / name
 
 
-def _arrays(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    for path in folder.rglob("zarr.json"):
-        metadata = json.loads(path.read_text())
-        if metadata["node_type"] == "array":
-            yield path.parent, metadata
+def _hash(data: bytes | memoryview) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _arrays(folder: Path) -> list[str]:
+    """Names of the group's arrays; what else lies in the folder is not the store's."""
+    return sorted(path.parent.name for path in folder.glob("*/zarr.json"))
+
+
+def _verified_metadata(folder: Path) -> dict[str, dict[str, Any]]:
+    """Each array's metadata, by name. Raises DamagedError where they are not as recorded."""
+    recorded = _sealed_record(folder).get(_ARRAYS)
+    found = {}
+    for name in _arrays(folder) if recorded is None else recorded:
+        try:
+            data = (folder / name / "zarr.json").read_bytes()
+            found[name] = json.loads(data)
+        except (OSError, ValueError) as error:
+            raise DamagedError(folder, f"{name}/zarr.json cannot be read ({error})") from error
+        if recorded is not None and _hash(data) != recorded[name]:
+            raise DamagedError(folder, f"{name}/zarr.json has not the hash that was noted")
+    return found
+
+
+def _chunk_files(array: Path, metadata: dict[str, Any]) -> Iterator[Path]:
+    """Every chunk file that the array's shape demands; a scalar's one is the file ``c``."""
+    chunks = metadata["chunk_grid"]["configuration"]["chunk_shape"]
+    counts = [math.ceil(n / c) for n, c in zip(metadata["shape"], chunks, strict=True)]
+    for place in itertools.product(*(range(count) for count in counts)):
+        yield array.joinpath("c", *map(str, place))
+
+
+def _has_bytes(path: Path) -> bool:
+    try:
+        return path.stat().st_size > 0
+    except FileNotFoundError:
+        return False
+
+
+def _has_checksums(metadata: dict[str, Any]) -> bool:
+    return bool(metadata["codecs"][-1]["name"] == _CHECKSUM["name"])
+
+
+def _without_checksums(metadata: dict[str, Any]) -> bytes:
+    """An array's ``zarr.json`` as it was before chunks had checksums."""
+    return json.dumps({**metadata, "codecs": metadata["codecs"][:-1]}, indent=2).encode()
+
+
+def _check_chunk(folder: Path, key: str, data: memoryview) -> None:
+    """Raise DamagedError unless a chunk ends in its checksum."""
+    import google_crc32c
+    import numpy as np
+
+    found = int.from_bytes(data[-_CHECKSUM_BYTES:], "little")
+    if google_crc32c.value(np.frombuffer(data[:-_CHECKSUM_BYTES], np.uint8)) != found:
+        raise DamagedError(folder, f"chunk {key} is damaged: it has not its checksum")
 
 
 def _chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
@@ -230,19 +322,29 @@ def _stoppable_store() -> Any:
     return StoppableStore
 
 
-def _strict_store() -> Any:
-    """The wrapper class (made on demand: importing zarr takes a second)."""
+def _strict_store(folder: Path, arrays: frozenset[str], checked: frozenset[str]) -> Any:
+    """The wrapper class of one group (made on demand: importing zarr takes a second)."""
     from zarr.storage import WrapperStore
 
     class StrictStore(WrapperStore[Any]):
-        """Raises MissingChunkError where zarr would return the fill value."""
+        """Raises DamagedError, naming the chunk, where zarr would return the fill value or noise.
+
+        It has these arrays and nothing that lies beside them; the chunks of those in ``checked``
+        have checksums.
+        """
+
+        async def list_dir(self, prefix: str) -> AsyncIterator[str]:
+            async for name in self._store.list_dir(prefix):
+                if prefix or name in arrays or name == "zarr.json":
+                    yield name
 
         async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Any:
             value = await self._store.get(key, prototype, byte_range)
-            if value is None and _CHUNK_KEY.search(key):
-                raise MissingChunkError(
-                    f"{self._store}: chunk {key} is missing; expected every chunk of the array."
-                )
+            chunk = _CHUNK_KEY.match(key)
+            if chunk and value is None:
+                raise MissingChunkError(folder, f"chunk {key} is missing")
+            if chunk and chunk[1] in checked and byte_range is None:
+                _check_chunk(folder, key, memoryview(value.as_numpy_array()))
             return value
 
     return StrictStore

@@ -158,7 +158,7 @@ def test_the_lock_of_one_slot_does_not_hold_up_another(tmp_path: Path) -> None:
     record: dict[str, Any] = {"settings": {}, "recipe": "r", "checks": []}
     data = xr.Dataset({"value": ((), 1.0)})
     ended = threading.Event()
-    with store._locked(SLOT):
+    with store.files(SLOT).locked():
 
         def write_other() -> None:
             store.write(OTHER, data, record)

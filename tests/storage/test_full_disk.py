@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from storage import zarr_files
+from storage import sealed_json, zarr_files
 from storage.errors import StoreError, StoreFullError
 from storage.versions import Slot, VersionedStore
 
@@ -267,7 +267,7 @@ def test_chunks_under_way_do_not_make_the_folder_anew(
     "target",
     [
         (Path, "mkdir"),
-        (Path, "write_text"),
+        (sealed_json, "dump"),
         (os, "rename"),
         (os, "fsync"),
         (zarr_files, "sync_folder"),
@@ -305,7 +305,11 @@ def test_no_room_for_the_pointer(
         sync_folder(folder)
         if folder.name == "versions":
             # The new version is in its place; only the pointer is missing.
-            target = {"write": "json.dump", "fsync": "os.fsync", "replace": "os.replace"}[fails]
+            target = {
+                "write": "storage.sealed_json.dump",
+                "fsync": "os.fsync",
+                "replace": "os.replace",
+            }[fails]
             monkeypatch.setattr(target, _no_room)
 
     monkeypatch.setattr(zarr_files, "sync_folder", sync_then_fill)

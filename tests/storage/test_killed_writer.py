@@ -151,9 +151,9 @@ WRITING = [
     ("os:rename", "versions", 1, "enter", "previous"),
     ("os:rename", "versions", 1, "leave", "previous"),
     ("storage.zarr_files:sync_folder", "versions", 1, "leave", "previous"),
-    ("json:dump", "current.json", 1, "enter", "previous"),
-    ("json:dump", "current.json", 1, "half", "previous"),
-    ("json:dump", "current.json", 1, "leave", "previous"),
+    ("storage.sealed_json:dump", "current.json", 1, "enter", "previous"),
+    ("storage.sealed_json:dump", "current.json", 1, "half", "previous"),
+    ("storage.sealed_json:dump", "current.json", 1, "leave", "previous"),
     ("os:replace", "current.json", 1, "enter", "previous"),
     ("os:replace", "current.json", 1, "leave", "new"),
     ("shutil:rmtree", "staging", 1, "enter", "new"),
@@ -164,25 +164,25 @@ WRITING = [
 CHECKING = [
     ("os:replace", "current.json", 1, "leave", "previous"),
     ("storage.versions:VersionedStore.pass_version", "sharp", 1, "enter", "previous"),
-    ("json:dump", "verdicts", 1, "half", "previous"),
+    ("storage.sealed_json:dump", "verdicts", 1, "half", "previous"),
     ("os:replace", "verdicts", 1, "enter", "previous"),
     ("os:replace", "verdicts", 1, "leave", "previous"),
-    ("json:dump", "current.json", 2, "half", "previous"),
+    ("storage.sealed_json:dump", "current.json", 2, "half", "previous"),
     ("os:replace", "current.json", 2, "enter", "previous"),
     ("os:replace", "current.json", 2, "leave", "new"),
 ]
 
 REJECTING = [
-    ("json:dump", "verdicts", 1, "half", "rejected"),
+    ("storage.sealed_json:dump", "verdicts", 1, "half", "rejected"),
     ("os:replace", "verdicts", 1, "leave", "rejected"),
-    ("json:dump", "current.json", 1, "half", "rejected"),
+    ("storage.sealed_json:dump", "current.json", 1, "half", "rejected"),
     ("os:replace", "current.json", 1, "enter", "rejected"),
     ("os:replace", "current.json", 1, "leave", "previous"),
 ]
 
 # A candidate that nobody checks any more is collected.
 COLLECTING = [
-    ("json:dump", "current.json", 2, "half"),
+    ("storage.sealed_json:dump", "current.json", 2, "half"),
     ("os:replace", "current.json", 2, "enter"),
     ("os:replace", "current.json", 2, "leave"),
     ("os:rename", "collected-", 1, "enter"),

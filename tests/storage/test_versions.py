@@ -20,8 +20,10 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from storage.errors import MissingChunkError, NoVersionError, StoreError
-from storage.versions import Pointer, Slot, VersionedStore
+from storage.errors import MissingChunkError, NoVersionError
+from storage.slot_files import Pointer
+from storage.verification import verify_slot
+from storage.versions import Slot, VersionedStore
 
 MakeRecord = Callable[..., dict[str, Any]]
 Fingerprint = Callable[[Path], dict[str, str]]
@@ -125,11 +127,26 @@ def test_an_unknown_version_is_told(store: VersionedStore, slot: Slot) -> None:
     assert version in str(caught.value)
 
 
-def test_a_broken_pointer_is_told(store: VersionedStore, slot: Slot) -> None:
-    _write(store, slot, 1)
-    (_folder(store, slot) / "current.json").write_text('{"version": ')
-    with pytest.raises(StoreError, match=r"current.json: is not JSON .*; expected a pointer"):
-        store.current(slot)
+@pytest.mark.parametrize("text", ['{"version": ', "[]", '{"version": "x"}', None])
+def test_a_broken_pointer_is_made_again_of_versions_and_verdicts(
+    store: VersionedStore, slot: Slot, text: str | None
+) -> None:
+    good = [_write(store, slot, value, "sharp") for value in range(3)]
+    for version in good:
+        store.pass_version(slot, version, "sharp", 1.0)
+    store.reject(slot, _write(store, slot, 3, "sharp"), "sharp", "blurred")
+    waiting = _write(store, slot, 4, "sharp")
+    before = store.pointer(slot)
+    assert before == Pointer(good[2], "recipe of 2", (good[1], good[0]), (waiting,))
+    path = _folder(store, slot) / "current.json"
+    if text is None:
+        path.unlink()
+    else:
+        path.write_text(text)
+    assert store.pointer(slot) == before
+    assert [found.slot for found in verify_slot(store, slot)] == [slot]
+    assert store.files(slot).stored_pointer() == before
+    assert list(verify_slot(store, slot)) == []
 
 
 def test_a_reader_keeps_the_version_it_opened(tmp_path: Path, slot: Slot) -> None:

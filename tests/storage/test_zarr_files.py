@@ -369,14 +369,14 @@ def test_an_incomplete_group_is_told(split: Path, chunk: str) -> None:
     (split / chunk).unlink()
     with pytest.raises(MissingChunkError) as caught:
         verify_complete(split)
-    assert str(split / chunk.split("/")[0]) in str(caught.value)
+    assert f"{split}: chunk {chunk} is missing or empty" in str(caught.value)
 
 
 def test_an_array_without_any_chunk_is_told(split: Path) -> None:
     for path in (split / "field/c").rglob("*"):
         if path.is_file():
             path.unlink()
-    with pytest.raises(MissingChunkError, match="0 chunks are stored; expected 6"):
+    with pytest.raises(MissingChunkError, match="0 of 6 chunks of field are there"):
         verify_complete(split)
 
 
@@ -406,7 +406,9 @@ def test_a_record_that_cannot_be_read_is_told(
 ) -> None:
     write_dataset(_varied(), tmp_path / "group", {})
     damage(tmp_path / "group/zarr.json")
-    with pytest.raises(StoreError, match=r"group/zarr\.json: the version's record cannot be read"):
+    with pytest.raises(
+        StoreError, match=r"group: zarr\.json, the version's record, cannot be read"
+    ):
         read_record(tmp_path / "group")
 
 

@@ -96,7 +96,7 @@ def write_and_die(
 
     ``target`` is ``module:name``; only calls with ``holding`` in an argument count (the root's
     own path apart). ``when`` is ``enter``, ``leave``, or ``half``: having written half of what
-    ``json.dump`` would write.
+    ``sealed_json.dump`` would write.
     """
     _die_in(root, target, holding, call, when)
     write_many(report, root=root, **arguments)
@@ -181,7 +181,7 @@ def _die_in(root: str, target: str, holding: str, call: int, when: str) -> None:
             return function(*arguments, **keywords)
         if when == "half":
             text = json.dumps(arguments[0])
-            arguments[1].write(text[: len(text) // 2])
+            arguments[1].write(text[: len(text) // 2].encode())
             arguments[1].flush()
         if when == "leave":
             function(*arguments, **keywords)
