@@ -9,6 +9,7 @@ import pytest
 from storage.schemas import systems
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist looks at the groups in this hook, too
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Group a system's tests together, the others by their file (for ``--dist loadgroup``)."""
     for item in items:

@@ -202,8 +202,9 @@ def alternate_least_squares(
         return
     for _ in range(sweeps):
         solve_images(values, counted, factors, ridge)
-        for k in range(rank):
-            _normalise(images[k], weights[:, k])
+        # Images that grow alike have weights that grow without bound, until single precision
+        # cannot tell them apart.
+        _orthogonalise(counted, factors)
         solve_weights(values, counted, factors, True)
     _orthogonalise(counted, factors)
 

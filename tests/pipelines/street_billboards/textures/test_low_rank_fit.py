@@ -73,9 +73,24 @@ def test_more_components_leave_less(seed: int, share: float) -> None:
     values = of_rank(5, 3, 300, seed) + random.normal(size=(5, 300)).astype(np.float32)
     seen = random.random(values.shape) < share
     errors = [squared_error(values, seen, rank) for rank in range(6)]
-    # Next to nothing is left of a component more than there are: that need not fall any further.
-    assert all(b <= a + 1e-4 * errors[0] for a, b in itertools.pairwise(errors))
+    # Next to nothing is left of a component more than there are: that need not fall any further,
+    # and the weights' pull may cost that little.
+    assert all(b <= a + 1e-3 * errors[0] for a, b in itertools.pairwise(errors))
     assert errors[5] < 0.05 * errors[0]
+
+
+def test_components_that_grow_alike_do_not_blow_up() -> None:
+    """With images left as they were solved for, the weights of this one passed 1e25."""
+    random = np.random.default_rng(54)
+    values = of_rank(5, 3, 300, 54) + random.normal(size=(5, 300)).astype(np.float32)
+    seen = random.random(values.shape) < 0.8
+    fits = [fit_low_rank(values, seen, 2, sweeps=sweeps) for sweeps in (30, 60)]
+    for _, weights, images in fits:
+        assert np.abs(weights).max() < 4 * np.ptp(values)
+        assert np.abs(images).max() < 20
+    np.testing.assert_allclose(
+        fits[0].weights @ fits[0].images, fits[1].weights @ fits[1].images, atol=1.0
+    )
 
 
 def test_images_are_orthogonal_centred_and_of_unit_size() -> None:
