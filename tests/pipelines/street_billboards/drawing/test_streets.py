@@ -69,7 +69,14 @@ def from_the_front(
 
 
 @pytest.mark.parametrize(("colour", "tint_side"), [("ycocg", 16), ("ycocg", 32), ("rgb", 32)])
-@pytest.mark.parametrize("ranks", [(4, 1, 1), (0, 0, 0), (3, 0, 2), (0, 2, 1), (16, 5, 7)])
+@pytest.mark.parametrize(
+    "ranks",
+    [
+        (0, 0, 0),
+        (3, 0, 2),
+        *(pytest.param(r, marks=pytest.mark.slow) for r in ((4, 1, 1), (0, 2, 1), (16, 5, 7))),
+    ],
+)
 @pytest.mark.parametrize("turns", [STILL, TURNING])
 def test_a_square_shows_its_decoded_texels(
     colour: str, tint_side: int, ranks: tuple[int, int, int], turns: NDArray[np.bool_]

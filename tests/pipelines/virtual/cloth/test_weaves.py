@@ -24,7 +24,13 @@ class Measured(NamedTuple):
     photos: np.ndarray  # (views, lights, y, x, 3)
 
 
-@pytest.fixture(scope="module", params=list(MATERIALS))
+_LARGE = {"silk", "twill"}
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(m, marks=pytest.mark.slow if m in _LARGE else ()) for m in MATERIALS],
+)
 def measured(request: pytest.FixtureRequest) -> Measured:
     cloth = make_cloth(request.param, 3)
     gonio = Gonioreflectometer(cloth, ANGLES, (48, 48), samples=4)
