@@ -35,6 +35,11 @@ class Workspace:
         """All versions of all assets."""
         return VersionedStore(self.root / "store")
 
+    @property
+    def pictures(self) -> Path:
+        """Where commands write pictures for people: beside the data, not among them."""
+        return self.root.absolute().parent / "pictures"
+
     def inbox(self, system: str) -> Path:
         """Where people drop a system's files; what lies here is registered."""
         return self.root / "inbox" / system

@@ -11,6 +11,7 @@ import json
 import sys
 
 import click
+from click.shell_completion import CompletionItem
 
 from tsuya.console import output, says_errors
 
@@ -36,6 +37,30 @@ class _Systems(click.Group):
         from tsuya.run_command import run_command
 
         return run_command(SYSTEMS[name]) if name in SYSTEMS else None
+
+
+class _SystemName(click.ParamType):
+    """A system's name; the systems are imported when one is asked for."""
+
+    name = "system"
+
+    def convert(
+        self, value: str, parameter: click.Parameter | None, context: click.Context | None
+    ) -> str:
+        """The name, or an error that lists the names there are."""
+        from storage.schemas import systems
+
+        if value not in systems():
+            self.fail(f"{value!r} is no system; expected one of {', '.join(systems())}.")
+        return value
+
+    def shell_complete(
+        self, context: click.Context, parameter: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """The systems' names."""
+        from storage.schemas import systems
+
+        return [CompletionItem(name) for name in systems() if name.startswith(incomplete)]
 
 
 @main.group(cls=_Systems)
@@ -92,15 +117,85 @@ def rollback(key: str) -> None:
 
 
 @main.command()
+@click.argument("key")
+@click.option(
+    "--as",
+    "ending",
+    type=click.Choice(("png", "exr", "webp", "mp4")),
+    default="png",
+    show_default=True,
+    help="EXR is linear; WebP and MP4 are for what moves.",
+)
+@says_errors
+def pictures(key: str, ending: str) -> None:
+    """Write KEY's pictures again, full size, under pictures/, and print their paths."""
+    from assets_defs.workspace import Workspace
+    from tsuya.console import shown_path
+    from tsuya.gallery import write_pictures_as
+    from tsuya.keys import parse_key
+
+    workspace = Workspace.of_checkout()
+    slot = parse_key(key)
+    for path in write_pictures_as(workspace.store, slot, ending, workspace.pictures):
+        click.echo(shown_path(path))
+
+
+@main.command()
+@click.argument("key", required=False)
+@as_json
+@says_errors
+def verify(key: str | None, as_json: bool) -> None:
+    """Check every stored byte, of KEY or of everything; put what is damaged out of use."""
+    from assets_defs.workspace import Workspace
+    from storage.verification import verify_slot
+    from tsuya.keys import parse_key
+
+    store = Workspace.of_checkout().store
+    slots = [parse_key(key)] if key else list(store.slots())
+    found = []
+    for slot in slots:
+        for finding in verify_slot(store, slot):
+            found.append(finding)
+            if not as_json:
+                click.echo(finding)
+    if as_json:
+        click.echo(json.dumps({"slots": len(slots), "damaged": [str(each) for each in found]}))
+    else:
+        again = " Run again to make it anew: `tsuya run SYSTEM`." if found else ""
+        click.echo(f"{len(slots)} slots verified, {len(found)} damaged.{again}")
+    sys.exit(1 if found else 0)
+
+
+@main.command()
+@click.argument("system", type=_SystemName())
+@says_errors
+def settings(system: str) -> None:
+    """What can be set of a SYSTEM: type, range, default and meaning."""
+    from assets_defs.systems import SYSTEMS
+    from tsuya.settings_table import settings_table
+
+    output().print(settings_table(SYSTEMS[system]))
+
+
+@main.command()
+@click.argument("shell", type=click.Choice(("bash", "zsh", "fish")))
+def completion(shell: str) -> None:
+    """Print what completes commands, items and settings: eval "$(tsuya completion bash)"."""
+    from click.shell_completion import get_completion_class
+
+    found = get_completion_class(shell)
+    assert found is not None
+    click.echo(found(main, {}, "tsuya", "_TSUYA_COMPLETE").source())
+
+
+@main.command()
 @as_json
 def doctor(as_json: bool) -> None:
     """Check what the project needs of this machine, and draw one picture."""
     from assets_defs.workspace import Workspace
     from tsuya.doctor import examine
-    from tsuya.gallery import PICTURES
 
-    Workspace.of_checkout()
-    findings = examine(PICTURES / "doctor.png")
+    findings = examine(Workspace.of_checkout().pictures / "doctor.png")
     if as_json:
         click.echo(json.dumps({"findings": [vars(finding) for finding in findings]}))
     for finding in findings if not as_json else ():

@@ -5,12 +5,16 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+INTERRUPTED = "Interrupted: what was made stays; run again to go on."
 
 
 class SetUpError(Exception):
@@ -27,7 +31,7 @@ def says_errors(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*arguments, **options)
         except KeyboardInterrupt:
-            fail("Interrupted: what was made stays; run again to go on.", 130)
+            fail(INTERRUPTED, 130)
         except (ValueError, StoreError, SetUpError) as error:
             fail(str(error), 2)
 
@@ -45,3 +49,9 @@ def output() -> Console:
     from rich.console import Console
 
     return Console(width=None if sys.stdout.isatty() else 160)
+
+
+def shown_path(path: Path) -> str:
+    """A path as one would type it here."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

@@ -9,29 +9,29 @@ import click
 
 from assets_defs.launcher import Outcome, Request
 from assets_defs.systems import SYSTEMS
-from tsuya.gallery import PICTURES, write_overviews, write_pictures
-from tsuya.session import Session, launch_all, open_session, report
+from tsuya.console import shown_path
+from tsuya.gallery import write_overviews, write_pictures
+from tsuya.session import launch_all, open_session, report
 
 
 def run_demo(as_json: bool) -> None:
     """Launch the examples of all systems, write and name their pictures, report."""
+    paths: list[Path] = []
     with open_session() as session:
+        store, folder = session.workspace.store, session.workspace.pictures
+
+        def name(written: Sequence[Path]) -> None:
+            paths.extend(written)
+            for path in written if not as_json else ():
+                session.say(shown_path(path))
 
         def show(outcomes: Sequence[Outcome]) -> None:
-            slots = [outcome.slot for outcome in outcomes]
-            _name(session, write_pictures(session.workspace.store, slots, PICTURES), as_json)
+            name(write_pictures(store, [outcome.slot for outcome in outcomes], folder))
 
         requests = [Request(system, system.examples(), "demo") for system in SYSTEMS.values()]
         launched = launch_all(session, requests, show)
         slots = [outcome.slot for outcome in launched.outcomes]
-        _name(session, write_overviews(session.workspace.store, slots, PICTURES), as_json)
-    report(session, launched, as_json)
+        name(write_overviews(store, slots, folder))
+    report(session, launched, paths if as_json else (), as_json)
     if not as_json:
         click.echo("\nThe pictures are under pictures/. `make ui` opens the graph in a browser.")
-
-
-def _name(session: Session, paths: Sequence[Path], as_json: bool) -> None:
-    """Say where pictures are."""
-    here = Path.cwd()
-    for path in paths if not as_json else ():
-        session.say(str(path.relative_to(here) if path.is_relative_to(here) else path))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from assets_defs.settings import PRESETS
 from assets_defs.system import Dimension, System
 from tsuya.console import says_errors
+from tsuya.settings_table import setting_rows
 
 if TYPE_CHECKING:
     from tsuya.session import Session
@@ -25,6 +27,7 @@ def run_command(system: System) -> click.Command:
             multiple=True,
             help=f"{_what_may_be_given(dimension)}; may be repeated. "
             f"Default: {', '.join(dimension.examples)}.",
+            shell_complete=_complete_item(dimension),
         )
         for dimension in system.dimensions
     ]
@@ -35,11 +38,11 @@ def run_command(system: System) -> click.Command:
             multiple=True,
             metavar="FIELD=VALUE",
             help="A setting, for every asset that has it; may be repeated.",
+            shell_complete=_complete_setting(system),
         ),
         click.Option(["--force"], is_flag=True, help="Also make what is current."),
         click.Option(["--json", "as_json"], is_flag=True, help="Print one JSON object."),
     ]
-    names = sorted({f for plan in system.plans.values() for f in plan.settings.model_fields})
 
     @says_errors
     def launch(
@@ -47,12 +50,28 @@ def run_command(system: System) -> click.Command:
     ) -> None:
         _launch(system, items, preset, settings, force=force, as_json=as_json)
 
-    return click.Command(
-        system.name,
-        callback=launch,
-        params=options,
-        help=f"{system.title}. Settings: {', '.join(names)}.",
+    return _RunCommand(
+        system.name, callback=launch, params=options, help=f"{system.title}.", system=system
     )
+
+
+class _RunCommand(click.Command):
+    """A command whose help ends with the system's settings."""
+
+    def __init__(self, name: str, *, system: System, **options: Any) -> None:
+        super().__init__(name, **options)
+        self._system = system
+
+    def format_epilog(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the settings below the options."""
+        with formatter.section("Settings, for --set"):
+            formatter.write_dl(
+                [
+                    (f"{row.name} {row.values}", f"{row.meaning} (default {row.default})")
+                    for row in setting_rows(self._system)
+                ],
+                col_max=44,
+            )
 
 
 def _launch(
@@ -65,6 +84,7 @@ def _launch(
     as_json: bool,
 ) -> None:
     from assets_defs.launcher import Request, check_settings
+    from tsuya.gallery import write_overviews, write_pictures
     from tsuya.session import launch_all, open_session, report
 
     with open_session() as session:
@@ -79,7 +99,39 @@ def _launch(
         }
         request = Request(system, system.cross_product(chosen), preset, given, force)
         launched = launch_all(session, [request])
-    report(session, launched, as_json)
+        slots = [outcome.slot for outcome in launched.outcomes]
+        store, folder = session.workspace.store, session.workspace.pictures
+        paths = [*write_pictures(store, slots, folder), *write_overviews(store, slots, folder)]
+    report(session, launched, paths, as_json)
+
+
+def _complete_item(dimension: Dimension) -> Callable[..., list[CompletionItem]]:
+    """The shell's completion of an item: built-in ones, then files."""
+
+    def complete(
+        context: click.Context, parameter: click.Parameter, begun: str
+    ) -> list[CompletionItem]:
+        known = [CompletionItem(key) for key in dimension.builtin if key.startswith(begun)]
+        has_files = bool(dimension.suffixes) or dimension.folders
+        return [*known, *([CompletionItem(begun, type="file")] if has_files else ())]
+
+    return complete
+
+
+def _complete_setting(system: System) -> Callable[..., list[CompletionItem]]:
+    """The shell's completion of ``FIELD=``."""
+
+    def complete(
+        context: click.Context, parameter: click.Parameter, begun: str
+    ) -> list[CompletionItem]:
+        rows = setting_rows(system)
+        return [
+            CompletionItem(f"{row.name}=", help=row.meaning)
+            for row in rows
+            if row.name.startswith(begun)
+        ]
+
+    return complete
 
 
 def _what_may_be_given(dimension: Dimension) -> str:

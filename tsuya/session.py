@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import click
 import dagster as dg
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from assets_defs.definitions import build_definitions
 from assets_defs.launcher import Launcher, LaunchError, Outcome, Request
 from assets_defs.systems import SYSTEMS
-from assets_defs.workspace import CHECKOUT, Workspace
-from tsuya.console import SetUpError, fail, output
+from assets_defs.workspace import Workspace
+from tsuya.console import INTERRUPTED, fail, output, shown_path
+from tsuya.display import Display
+from tsuya.history import open_history
+from tsuya.interruption import Interruption
 from tsuya.report import figures_table, outcome_reports, sizes_table
 
 
@@ -38,15 +40,27 @@ class Session:
 def open_session() -> Iterator[Session]:
     """Open the instance that the web UI shows; progress goes to standard error.
 
-    Raises SetUpError where ``make setup`` has not been run.
+    Ctrl-C ends what is under way: KeyboardInterrupt. Raises SetUpError where ``make setup`` has not
+    been run.
     """
     workspace = Workspace.of_checkout()
-    if not os.environ.get("DAGSTER_HOME"):
-        raise SetUpError(f"{CHECKOUT}: DAGSTER_HOME is not set; expected `make setup` to be run.")
-    with Display(Console(stderr=True)) as display, dg.DagsterInstance.get() as instance:
-        definitions = build_definitions(workspace, {"progress": display})
+    display = Display(Console(stderr=True))
+
+    def end() -> None:
+        display.stop()
+        click.echo(INTERRUPTED, err=True)
+
+    with open_history() as instance, display, Interruption(end) as interruption:
+
+        def progress(what: str, fraction: float) -> None:
+            if interruption.asked:  # where the exception was swallowed
+                raise KeyboardInterrupt
+            display(what, fraction)
+
+        definitions = build_definitions(workspace, {"progress": progress})
         job = definitions.get_repository_def().get_job
-        yield Session(workspace, instance, Launcher(instance, workspace, job, display), display.say)
+        launcher = Launcher(instance, workspace, job, progress)
+        yield Session(workspace, instance, launcher, display.say)
 
 
 class Launched(NamedTuple):
@@ -78,66 +92,23 @@ def launch_all(
     return Launched(outcomes, failures, time.perf_counter() - started)
 
 
-def report(session: Session, launched: Launched, as_json: bool) -> None:
-    """Print what became of the launches; exit with 1 where something failed."""
+def report(session: Session, launched: Launched, pictures: Sequence[Path], as_json: bool) -> None:
+    """Print what became of the launches and where the pictures are; exit with 1 on a failure."""
     reports = outcome_reports(session.workspace.store, launched.outcomes)
     if as_json:
-        summary = {"seconds": round(launched.seconds, 3), "failures": launched.failures}
+        summary = {
+            "seconds": round(launched.seconds, 3),
+            "failures": launched.failures,
+            "pictures": [str(path) for path in pictures],
+        }
         click.echo(json.dumps(summary | {"assets": reports}))
     else:
         systems = SYSTEMS.values()
         output().print(sizes_table(systems, reports), figures_table(systems, reports))
         made = sum(1 for outcome in launched.outcomes if outcome.state == "made")
         current = len(reports) - made
+        for path in pictures:
+            click.echo(shown_path(path))
         click.echo(f"{made} made, {current} current already, {launched.seconds:.1f} s.")
     if launched.failures:
         fail("\n".join(launched.failures), 1)
-
-
-class Display:
-    """A bar for the whole launch and one for the asset at work.
-
-    Not a terminal: one line for every asset instead.
-    """
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._bars = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._whole: dict[str, TaskID] = {}
-        self._asset: tuple[str, TaskID] | None = None
-
-    def __enter__(self) -> Display:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._bars.stop()
-
-    def say(self, line: str) -> None:
-        """Print a line on standard output, above the bars."""
-        self._bars.stop()
-        click.echo(line)
-        self._bars.start()
-
-    def __call__(self, what: str, fraction: float) -> None:
-        """Show a fraction: of a system (no brackets in its name) or of one of its assets."""
-        if "[" not in what:
-            if what not in self._whole:
-                self._whole[what] = self._bars.add_task(what, total=1.0)
-            self._bars.update(self._whole[what], completed=fraction)
-            return
-        if self._asset is None or self._asset[0] != what:
-            if self._asset is not None:
-                self._bars.remove_task(self._asset[1])
-            self._asset = (what, self._bars.add_task(what.replace("[", r"\["), total=1.0))
-            if not self._console.is_terminal:
-                self._console.print(what, markup=False, highlight=False)
-        self._bars.update(self._asset[1], completed=fraction)

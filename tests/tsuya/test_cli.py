@@ -233,13 +233,12 @@ def test_the_gallery_writes_a_png_for_every_picture(
 
 
 def test_the_doctor_finds_this_machine_well_and_draws(
-    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    home: Path,
 ) -> None:
-    monkeypatch.setattr("tsuya.gallery.PICTURES", tmp_path)
     result = tsuya("doctor")
     assert result.exit_code == 0, result.stdout
     assert all(line.startswith("ok") for line in result.stdout.splitlines())
-    assert Image.open(tmp_path / "doctor.png").size == (320, 240)
+    assert Image.open(home / "pictures" / "doctor.png").size == (320, 240)
 
 
 def test_a_checkout_that_is_not_set_up_says_so(
