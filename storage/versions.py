@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 from storage import zarr_files
 from storage.errors import DamagedError, NoVersionError, StoreError
 from storage.slot_files import Pointer, SlotFiles, Verdicts, is_slot
-from storage.work_state import WorkState
+from storage.work_state import WorkState, clear_work
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +177,7 @@ class VersionedStore:
             )
             zarr_files.sync(staged)
             written = self._publish(slot, staged, Written(version, content, True))
-            shutil.rmtree(files.folder / "work", ignore_errors=True)
+            clear_work(files.folder / "work")
         except OSError as error:
             raise zarr_files.disk_error(error, staged) from error
         finally:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
+from storage.errors import DamagedError
 from storage.versions import Slot, VersionedStore
 from storage.zarr_files import stored_bytes
 
@@ -16,22 +17,26 @@ if TYPE_CHECKING:
 
 
 def slot_report(store: VersionedStore, slot: Slot) -> dict[str, Any]:
-    """A slot's current version with its figures, and what waits or was rejected."""
+    """A slot's current version with its figures; what waits, was rejected and why, is damaged."""
     pointer = store.pointer(slot)
-    versions = store.versions(slot)
     report: dict[str, Any] = {
         "key": str(slot),
         "version": pointer.version,
         "earlier": len(pointer.earlier),
         "unchecked": len(pointer.candidates),
         "rejected": [
-            version
-            for version in versions
-            if any(not verdict["passed"] for verdict in store.verdicts(slot, version).values())
+            {"version": version, "check": check, "reason": verdict["reason"]}
+            for version in store.versions(slot)
+            for check, verdict in store.verdicts(slot, version).items()
+            if not verdict["passed"]
         ],
+        "damaged": store.files(slot).damage(),
     }
     if pointer.version is not None:
-        record = store.record(slot)
+        try:
+            record = store.record(slot)
+        except DamagedError:
+            return report  # said above
         report |= {
             "created": record["created"],
             "settings": record["settings"],
@@ -117,6 +122,22 @@ def status_table(reports: Sequence[dict[str, Any]]) -> Table:
             f"{report.get('bytes', 0) / 1000:.0f}",
             str(report["earlier"]),
             str(report["unchecked"] or ""),
-            str(len(report["rejected"]) or ""),
+            str(len({each["version"] for each in report["rejected"]}) or ""),
         )
     return table
+
+
+def status_notes(reports: Sequence[dict[str, Any]]) -> list[str]:
+    """Why versions were rejected, what is damaged, and what to do: a line each."""
+    notes = []
+    for report in reports:
+        for each in report["rejected"]:
+            notes.append(
+                f"{report['key']}: version {each['version']} was rejected by {each['check']}: "
+                f"{each['reason']}"
+            )
+        for what in report["damaged"]:
+            notes.append(
+                f"{report['key']}: damaged: {what}. `tsuya verify {report['key']}` mends it."
+            )
+    return notes

@@ -193,7 +193,8 @@ def neural_btf(
 
     plan = training_plan(settings)
     data = stored_training_data(plan, abrdf_matrix, abrdf_clusters)
-    trained = train(data, plan, resume=work.read(), keep=work.keep, progress=progress)
+    with work.alone():
+        trained = train(data, plan, resume=work.read(), keep=work.keep, progress=progress)
     shown = {"RMSE of the last batches": float(trained.curve_rmse[-1])}
     return neural_btf_dataset(trained), shown
 

@@ -13,7 +13,11 @@ import xarray as xr
 
 from storage.errors import StoreError, StoreFullError
 from storage.versions import Slot, VersionedStore
-from storage.work_state import WorkState
+from storage.work_state import BusyError, WorkState
+
+
+def _pieces(work: WorkState) -> list[Path]:
+    return [path for path in work.folder.iterdir() if path.suffix != ".lock"]
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def test_the_last_state_is_read_by_the_next_process(
     for state in (b"first", b"", bytes(range(256)) * 100):
         work.keep(state)
         assert VersionedStore(store.root).work(slot, "recipe-a" * 8).read() == state
-    assert len(list(work.folder.iterdir())) == 1
+    assert len(_pieces(work)) == 1
 
 
 def test_work_lies_beside_the_versions(work: WorkState, store: VersionedStore, slot: Slot) -> None:
@@ -58,11 +62,11 @@ def test_a_killed_writer_leaves_the_old_state(
             patch.setattr(os, name, killed)
             with pytest.raises(Killed):
                 work.keep(b"new and longer")
-        assert len(list(work.folder.iterdir())) == 2, "its piece, as after a kill"
+        assert len(_pieces(work)) == 2, "its piece, as after a kill"
         assert work.read() == b"old"
     work.keep(b"newer")
     assert work.read() == b"newer"
-    assert len(list(work.folder.iterdir())) == 1
+    assert len(_pieces(work)) == 1
 
 
 def test_a_piece_alone_is_no_state(work: WorkState) -> None:
@@ -72,7 +76,7 @@ def test_a_piece_alone_is_no_state(work: WorkState) -> None:
     assert work.read() is None
 
 
-def test_another_recipe_starts_afresh_and_takes_the_place(
+def test_another_recipe_starts_afresh_and_leaves_the_first_one_its_state(
     work: WorkState, store: VersionedStore, slot: Slot
 ) -> None:
     work.keep(b"of a")
@@ -81,8 +85,55 @@ def test_another_recipe_starts_afresh_and_takes_the_place(
     assert work.read() == b"of a"  # to look takes nothing away
     other.keep(b"of b")
     assert other.read() == b"of b"
+    assert work.read() == b"of a"
+
+
+def test_one_process_works_on_a_recipe(
+    work: WorkState,
+    store: VersionedStore,
+    slot: Slot,
+    make_record: Callable[..., dict[str, Any]],
+) -> None:
+    same, other = store.work(slot, "recipe-a" * 8), store.work(slot, "recipe-b" * 8)
+    with work.alone():
+        work.keep(b"of a")
+        with (
+            pytest.raises(BusyError, match="another process works on the same recipe"),
+            same.alone(),
+        ):
+            pass
+        with other.alone():
+            other.keep(b"of b")
+        # A version of another recipe is published meanwhile.
+        store.write(slot, xr.Dataset({"value": ((), 1.0)}), make_record())
+        assert work.read() == b"of a"
+        assert other.read() is None, "nobody works on it any more"
+    with same.alone():
+        assert same.read() == b"of a"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: data[:-1],
+        lambda data: data[:20],
+        lambda data: b"",
+        lambda data: b"another program's" + data,
+        lambda data: data[:-3] + bytes([data[-3] ^ 1]) + data[-2:],
+    ],
+    ids=["cut", "cut short", "empty", "foreign", "flipped bit"],
+)
+def test_a_state_that_is_not_whole_starts_the_work_anew(
+    work: WorkState, damage: Callable[[bytes], bytes], caplog: pytest.LogCaptureFixture
+) -> None:
+    work.keep(bytes(range(256)))
+    (path,) = _pieces(work)
+    path.write_bytes(damage(path.read_bytes()))
     assert work.read() is None
-    assert len(list(work.folder.iterdir())) == 1
+    (said,) = caplog.messages
+    assert "the work starts anew" in said
+    work.keep(b"new")
+    assert work.read() == b"new"
 
 
 def test_partitions_keep_apart(work: WorkState, store: VersionedStore, slot: Slot) -> None:
@@ -117,7 +168,7 @@ def test_a_full_disk_is_one_sentence_and_leaves_the_old_state(
     assert "\n" not in str(refusal.value)
     assert str(work.folder) in str(refusal.value)
     assert work.read() == b"old"
-    assert len(list(work.folder.iterdir())) == 1, "the piece would fill the disk further"
+    assert len(_pieces(work)) == 1, "the piece would fill the disk further"
 
 
 def test_a_full_disk_before_the_folder_is_there(

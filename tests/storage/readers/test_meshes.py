@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import struct
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -410,3 +411,65 @@ def test_a_concave_quad_is_cut_inside() -> None:
     arrow = np.array([[0, 0, 0], [2, -1, 0], [0.5, 0, 0], [2, 1, 0]], float)
     for turn in range(4):
         assert (_doubled_areas(np.roll(arrow, turn, axis=0)) > 0).all()
+
+
+def cells_outline(cells: set[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The corners of unit cells that touch by their sides, along the outline; [] for cells that
+    touch by a corner alone or have holes."""
+    following = {}
+    for x, y in cells:
+        for across, start, end in (
+            ((x, y - 1), (x, y), (x + 1, y)),
+            ((x + 1, y), (x + 1, y), (x + 1, y + 1)),
+            ((x, y + 1), (x + 1, y + 1), (x, y + 1)),
+            ((x - 1, y), (x, y + 1), (x, y)),
+        ):
+            if across not in cells and following.setdefault(start, end) != end:
+                return []
+    outline = [next(iter(following))]
+    while following[outline[-1]] != outline[0]:
+        outline.append(following[outline[-1]])
+    return outline if len(outline) == len(following) else []
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 200), st.integers(0, 3)), min_size=1, max_size=40))
+def test_outlines_of_cells_with_a_corner_at_every_cell(steps: list[tuple[int, int]]) -> None:
+    """Most corners lie on straight sides, many diagonals run through others: the area is known."""
+    cells = [(0, 0)]
+    for near, way in steps:
+        x, y = cells[near % len(cells)]
+        cells.append((x + (1, -1, 0, 0)[way], y + (0, 0, 1, -1)[way]))
+    flat = cells_outline(set(cells))
+    if flat:
+        areas = _doubled_areas(np.column_stack([flat, np.zeros(len(flat))]))
+        assert (areas > 1e-9).all()
+        assert areas.sum() == pytest.approx(2 * len(set(cells)))
+
+
+def test_a_hole_joined_to_the_outline() -> None:
+    """Corners that are there twice, as where a hole is joined to the outline, are all right."""
+    corners = [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)]
+    areas = _doubled_areas(np.column_stack([np.array(corners, float), np.zeros(10)]))
+    assert (areas > 1).all()
+    assert areas.sum() == pytest.approx(2 * (16 - 4))
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        np.tile(POSITIONS, (250, 1)),  # the same four corners over and over
+        np.random.default_rng(0).random((2000, 3)),
+        np.outer(np.linspace(0, 1, 2000), [1, 2, 3]),
+        np.zeros((2000, 3)),
+        np.random.default_rng(1).choice([-1.7e308, 0, 1.6e308], (2000, 3)),
+        [[np.cos(a), np.sin(a), 0] for a in np.linspace(0, 2 * np.pi, 2000, endpoint=False)],
+    ],
+)
+def test_polygons_of_many_corners_are_cut_at_once(outline: Any) -> None:
+    """Whatever the corners are; the clock is that of the process, which others do not slow."""
+    begin = time.process_time()
+    cut, _ = triangulate(np.array(outline), np.array([len(outline)]), np.arange(len(outline)))
+    assert time.process_time() - begin < 1
+    assert cut.shape == (len(outline) - 2, 3)
+    assert (np.unique(cut) == np.arange(len(outline))).all()
