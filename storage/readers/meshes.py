@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.obj_files import read_obj
 from storage.readers.ply_files import read_ply
-from storage.readers.polygons import PolygonMesh, triangulate
+from storage.readers.polygons import MOST_CORNERS, PolygonMesh, triangulate
 
 if TYPE_CHECKING:
     import trimesh
 
 FORMATS = "a PLY, OBJ or GLB mesh"
 
+_LARGE_FACE = 500  # corners; what cuts them takes more than in proportion
 _GL_FLOAT = 5126
 _PACKED_GEOMETRY = {
     "KHR_draco_mesh_compression",
@@ -49,8 +50,8 @@ def read_mesh(path: str | PathLike[str]) -> MeshFile:
     have count as none. Axes and units stay those of the file.
 
     Raises BadInput for a file that is missing, truncated or of another format, and for meshes
-    without faces, with positions or texture coordinates that are not finite, with references to
-    vertices that do not exist, or with degenerate faces (repeated corners, no area).
+    without faces, with more than ``MOST_CORNERS`` corners in large ones, with positions or texture
+    coordinates that are not finite, with references to vertices that do not exist, or with degenerate faces (repeated corners, no area).
     """
     file = Path(path)
     mesh = _read_polygons(file)
@@ -94,8 +95,8 @@ def mesh_format(file: Path) -> Literal["ply", "obj", "glb"]:
 
 
 def check_polygons(file: Path, mesh: PolygonMesh) -> None:
-    """Raise BadInput for a mesh without polygons, for polygons of less than three corners, with
-    references to vertices that do not exist, and for positions or texture coordinates of their
+    """Raise BadInput for a mesh without polygons, for polygons of less than three or of too many
+    corners, with references to vertices that do not exist, and for positions or texture coordinates of their
     corners that are not finite."""
     if len(mesh.sizes) == 0:
         points = f"{len(mesh.positions)} points without faces"
@@ -105,6 +106,13 @@ def check_polygons(file: Path, mesh: PolygonMesh) -> None:
         raise BadInput(
             file, f"face {face}", f"of {mesh.sizes[face]} corners", "at least three corners"
         )
+    large = mesh.sizes > _LARGE_FACE
+    if mesh.sizes[large].sum() > MOST_CORNERS:
+        face = int(mesh.sizes.argmax())
+        corners = f"of {mesh.sizes[face]} corners"
+        if mesh.sizes[face] <= MOST_CORNERS:
+            corners = f"one of {large.sum()} faces of more than {_LARGE_FACE} corners"
+        raise BadInput(file, f"face {face}", corners, f"at most {MOST_CORNERS} corners in such")
     count = len(mesh.positions)
     wrong = (mesh.corners < 0) | (mesh.corners >= count)
     if wrong.any():

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import heapq
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+MOST_CORNERS = 20_000
+"""Of a file's large polygons together: as many take seconds, more than in proportion."""
+
+_SLIVER = 1e-11  # twice the area by the longest side squared; readers refuse 1e-12
+
+_Triangle = tuple[int, int, int]
 
 
 class PolygonMesh(NamedTuple):
@@ -37,10 +45,10 @@ def triangulate(
     quads = np.flatnonzero(sizes == 4)
     triangles.append(_cut_quads(positions, corners, starts[quads][:, None] + np.arange(4)))
     owners.append(np.repeat(quads, 2))
-    for polygon in np.flatnonzero(sizes > 4):
-        numbers = starts[polygon] + np.arange(sizes[polygon])
-        triangles.append(_cut_ears(positions, corners, numbers))
-        owners.append(np.full(len(triangles[-1]), polygon))
+    larger = np.flatnonzero(sizes > 4)
+    if larger.size:
+        triangles.append(_cut_larger(positions, corners, starts[larger], sizes[larger]))
+        owners.append(np.repeat(larger, sizes[larger] - 2))
     owner = np.concatenate(owners)
     order = np.argsort(owner, kind="stable")
     return np.concatenate(triangles)[order], owner[order]
@@ -63,44 +71,108 @@ def _cut_quads(
     return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
 
 
-def _cut_ears(
-    positions: NDArray[np.float64], corners: NDArray[np.int64], polygon: NDArray[np.int64]
+def _cut_larger(
+    positions: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    sizes: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """(n,) numbers of corners to (n - 2, 3): the smallest ear first, so that corners on a
-    straight side are not left over alone; the last four corners as a quad."""
-    flat = _in_its_plane(positions[corners[polygon]])
-    left = list(range(len(polygon)))
-    ears = []
-    while len(left) > 4:
-        ear = _smallest_ear(flat[left])
-        ears.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
-        del left[ear]
-    last = _cut_quads(positions, corners, polygon[left][None])
-    return np.concatenate([polygon[np.array(ears)], last])
+    """Polygons that begin at ``starts`` to (sum of sizes - 2, 3) numbers of corners."""
+    from manifold3d import triangulate as cut
+
+    firsts = np.cumsum(sizes) - sizes
+    numbers = np.repeat(starts - firsts, sizes) + np.arange(sizes.sum())
+    flat = _in_their_planes(positions[corners[numbers]], firsts, sizes)
+    # Manifold cuts any outline into as many triangles as there have to be, at once even where
+    # it crosses itself, but corners in the middle of a side into triangles without area.
+    pieces = [
+        cut([flat[first : first + size]], 0.0) for first, size in zip(firsts, sizes, strict=True)
+    ]
+    triangles = np.concatenate(pieces).astype(np.int64) + np.repeat(firsts, sizes - 2)[:, None]
+    ends = np.cumsum(sizes - 2)
+    slivers = np.flatnonzero(_flatness(flat[triangles]) <= _SLIVER)
+    for polygon in np.unique(np.searchsorted(ends, slivers, side="right")):
+        its = slice(ends[polygon] - sizes[polygon] + 2, ends[polygon])
+        triangles[its] = _without_slivers(flat, triangles[its])
+    return numbers[triangles]
 
 
-def _smallest_ear(outline: NDArray[np.float64]) -> int:
-    before, after = np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)
-    area = _cross(outline - before, after - outline)
-    for ear in np.argsort(np.where(area > 0, area, np.inf)):
-        if area[ear] <= 0:
+def _flatness(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, 3, 2) to twice the area, negative if clockwise, by the longest side squared."""
+    sides = triangles - np.roll(triangles, 1, axis=1)
+    longest = (sides**2).sum(axis=2).max(axis=1)
+    doubled = sides[:, 1, 0] * sides[:, 2, 1] - sides[:, 1, 1] * sides[:, 2, 0]
+    return np.divide(doubled, longest, out=np.zeros_like(doubled), where=longest > 0)
+
+
+def _without_slivers(flat: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles of one polygon, those without area joined to their neighbours.
+
+    The longest side of such a triangle a, b, c, whose corner c lies between a and b, is turned:
+    with the neighbour b, a, d it makes a, d, c and d, b, c. The longest first, as a neighbour that
+    has no area either has to give way before.
+    """
+    points: list[tuple[float, float]] = flat.tolist()
+
+    def squared(a: int, b: int) -> float:
+        return (points[a][0] - points[b][0]) ** 2 + (points[a][1] - points[b][1]) ** 2
+
+    def longest_side_first(a: int, b: int, c: int) -> _Triangle:
+        turns = ((a, b, c), (b, c, a), (c, a, b))
+        return max(turns, key=lambda turn: squared(turn[0], turn[1]))
+
+    def is_sliver(a: int, b: int, c: int) -> bool:
+        (ax, ay), (bx, by), (cx, cy) = points[a], points[b], points[c]
+        doubled = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        return abs(doubled) <= _SLIVER * squared(a, b) and squared(a, b) > 0
+
+    cut = [longest_side_first(*triangle) for triangle in triangles.tolist()]
+    across = {side: row for row, (a, b, c) in enumerate(cut) for side in ((a, b), (b, c), (c, a))}
+    waiting = [
+        (-squared(*triangle[:2]), row, triangle)
+        for row, triangle in enumerate(cut)
+        if is_sliver(*triangle)
+    ]
+    heapq.heapify(waiting)
+    for _ in range(4 * len(cut)):  # more than any polygon without crossings needs
+        if not waiting:
             break
-        a, b, c = before[ear], outline[ear], after[ear]
-        others = np.delete(outline, [ear - 1, ear, (ear + 1) % len(outline)], axis=0)
-        inside = [_cross(q - p, others - p) >= 0 for p, q in ((a, b), (b, c), (c, a))]
-        if not np.logical_and.reduce(inside).any():
-            return int(ear)
-    return int(np.argmax(area))  # the outline crosses itself: no cut is right
+        _, row, triangle = heapq.heappop(waiting)
+        a, b, c = triangle
+        other = across.get((b, a))
+        if cut[row] != triangle or other is None or 0 in (squared(a, c), squared(b, c)):
+            continue
+        (d,) = set(cut[other]) - {a, b}
+        del across[a, b], across[b, a]
+        across |= {(a, d): row, (d, c): row, (c, d): other, (b, c): other}
+        for changed, corners in ((row, (a, d, c)), (other, (d, b, c))):
+            cut[changed] = longest_side_first(*corners)
+            if is_sliver(*cut[changed]):
+                heapq.heappush(waiting, (-squared(*cut[changed][:2]), changed, cut[changed]))
+    return np.array(cut, np.int64)
 
 
-def _in_its_plane(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) to (n, 2), counter-clockwise, along the outline's mean normal (Newell's)."""
-    around = points - points.mean(axis=0)
-    normal = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    return np.stack([around @ across, around @ np.cross(normal, across)], axis=1)
+def _in_their_planes(
+    points: NDArray[np.float64], firsts: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(n, 3) to (n, 2), each polygon counter-clockwise along its mean normal (Newell's), in
+    units of its own size."""
+    around = _in_own_units(points, firsts, sizes)
+    following = np.arange(len(points)) + 1
+    following[firsts + sizes - 1] = firsts
+    normals = np.add.reduceat(np.cross(around, around[following]), firsts)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    across = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    axes = np.repeat(np.stack([across, np.cross(normals, across)], axis=1), sizes, axis=0)
+    return np.einsum("nij,nj->ni", axes, around)
 
 
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    cross: NDArray[np.float64] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return cross
+def _in_own_units(
+    points: NDArray[np.float64], firsts: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """About the middle of their box, which is 2 wide at most; nothing overflows."""
+    low, high = np.minimum.reduceat(points, firsts), np.maximum.reduceat(points, firsts)
+    half = (high / 2 - low / 2).max(axis=1, keepdims=True)
+    half[half == 0] = 1
+    return (points - np.repeat(low / 2 + high / 2, sizes, axis=0)) / np.repeat(half, sizes, axis=0)

@@ -295,6 +295,16 @@ REFUSED: list[tuple[str, str, Callable[[Path], Any]]] = [
     ("zero.obj", "line 7 is 'f 0 1 2'", text(CORNERS + "f 0 1 2\n")),
     ("back.obj", "line 7 is 'f -5 1 2'", text(CORNERS + "f -5 1 2\n")),
     ("map.obj", "to the 2 texture coordinates", text(CORNERS + "f 1/1 2/2 3/3\n")),
+    (
+        "large.obj",
+        "face 0 is of 30000 corners; expected at most 20000 corners in such",
+        text(CORNERS + "f" + " 1 2 3" * 10_000 + "\n"),
+    ),
+    (
+        "large.obj",
+        "face 1 is one of 3 faces of more than 500 corners",
+        text(CORNERS + "f 1 2 3\n" + ("f" + " 1 2 3" * 3_000 + "\n") * 3),
+    ),
     ("word.obj", "line 1 is 'v 1 two 3'; expected 3 numbers", text("v 1 two 3\n")),
     ("short.obj", "line 2 is 'v 1 2'; expected 3 numbers", text("v 1 2 3\nv 1 2")),
     (
