@@ -1,33 +1,52 @@
 """The inbox: a file dropped into ``data/inbox/<system>/`` is registered and made.
 
+Anything may lie there. Each item is looked at alone, and only once it lies still; links are
+followed inside the system's inbox. An item that passes its check gets a partition and a run; what
+cannot be used is named, with the reason, in `NOTES` beside it for as long as it lies there. The
+partition of an item that is gone goes with it, unless versions of it are stored: these stay to be
+looked at, and `tsuya remove` is for them.
+
 What is already registered under its name and has not changed since is left alone: the command
 line registers the files that it copies here and launches them itself.
 """
 
+# Dagster looks at the sensor's annotations itself: no postponed ones here.
 import json
 import os
-import shutil
 import time
-from collections.abc import Mapping
+import uuid
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, wait
 from pathlib import Path
-from typing import Any
+from threading import Thread
+from typing import Any, TypedDict, cast
 
 import dagster as dg
 
 from assets_defs.dagster_assets import dynamic_partitions
 from assets_defs.rematerialisation import LaunchConfig
-from assets_defs.sources import Source
+from assets_defs.sources import NOTES, Source, by_key, json_hash
 from assets_defs.system import Dimension, System
+from assets_defs.taking_in import take_in
 from assets_defs.workspace import Workspace
+from storage.errors import StoreError
+
+__all__ = ["SETTLED_SECONDS", "inbox_sensor", "take_in"]
 
 SETTLED_SECONDS = 3.0
 """A file that changed more recently may still be on its way."""
+CHECK_SECONDS = 5.0
+"""So long a tick waits for checks; what is not done then is for later ticks."""
+_Change = dg.AddDynamicPartitionsRequest | dg.DeleteDynamicPartitionsRequest
+_HEAD = "What lies here and is not used, and why. This file goes when all of it is used or gone."
 
 
 def inbox_sensor(
     job: dg.JobDefinition, systems: Mapping[str, System], workspace: Workspace
 ) -> dg.SensorDefinition:
-    """The one sensor: looks at names, sizes and times only, so a tick stays short."""
+    """The one sensor. A tick looks at names, sizes and times; what changed is read and checked
+    beside it, so that a tick stays short."""
+    checks = _Checks()
 
     @dg.sensor(
         name="inbox",
@@ -37,96 +56,269 @@ def inbox_sensor(
         description="Registers files dropped into data/inbox/<system>/ and requests their runs.",
     )
     def look(context: dg.SensorEvaluationContext) -> dg.SensorResult:
-        seen: dict[str, str] = json.loads(context.cursor or "{}")
-        now: dict[str, str] = {}
+        seen = _seen(context.cursor)
+        now: dict[str, _Entry] = {}
         runs: list[dg.RunRequest] = []
-        added: list[dg.AddDynamicPartitionsRequest] = []
+        changes: list[_Change] = []
+        checks.start_tick()
         for system in systems.values():
-            for dimension in system.dimensions:
-                partitions = dynamic_partitions(system, dimension.name)
-                registered = set(context.instance.get_dynamic_partitions(str(partitions.name)))
-                new = set(dimension.builtin) - registered
-                for path in system.files(dimension.name, workspace.inbox(system.name)):
-                    name, key, stamp = (
-                        f"{system.name}/{path.name}",
-                        Source.of(path).key,
-                        _stamp(path),
-                    )
-                    if stamp is None:
-                        now |= {name: seen[name]} if name in seen else {}
-                        continue
-                    now[name] = stamp
-                    if seen.get(name) == stamp or (name not in seen and key in registered):
-                        continue
-                    new |= {key} - registered
-                    runs.append(_request(system, dimension, key, name, stamp))
-                if new:
-                    added.append(partitions.build_add_request(sorted(new)))
+            its = {name: seen[name] for name in seen if name.startswith(f"{system.name}/")}
+            tick = _Look(system, workspace, context.instance, checks, its)
+            try:
+                tick.look()
+            except Exception as error:  # a system's trouble is not the others'
+                context.log.exception(f"{system.name}: {error}")
+                now |= its
+                continue
+            now |= tick.now
+            runs += tick.runs
+            changes += tick.changes
+            try:
+                _write_notes(workspace.inbox(system.name), tick.notes)
+            except OSError as error:  # a folder that is only read
+                context.log.warning(f"{system.name}: {NOTES} cannot be written ({error}).")
         return dg.SensorResult(
-            run_requests=runs, dynamic_partitions_requests=added, cursor=json.dumps(now)
+            run_requests=runs, dynamic_partitions_requests=changes, cursor=json.dumps(now)
         )
 
     return look
 
 
-def take_in(
-    path: Path,
-    system: System,
-    dimension: Dimension,
-    given: Mapping[str, Any],
-    workspace: Workspace,
-    instance: dg.DagsterInstance,
-) -> str:
-    """Read a file, copy it into the inbox and register it; returns its key.
+class _Entry(TypedDict):
+    """What the cursor keeps of an item, by its place."""
 
-    ``given`` are the settings that it is to be used with (a crop, say). A file of a name that is
-    taken by other content gets digits of its hash. Raises ValueError for a file that cannot be
-    used; then nothing is copied.
+    key: str
+    stamp: str
+    refused: str | None
+
+
+def _seen(cursor: str | None) -> dict[str, _Entry]:
+    """What was seen; nothing where the cursor is of an earlier kind."""
+    entries: dict[str, Any] = json.loads(cursor or "{}")
+    return {name: cast(_Entry, entry) for name, entry in entries.items() if isinstance(entry, dict)}
+
+
+class _Look:
+    """One look into one system's inbox."""
+
+    def __init__(
+        self,
+        system: System,
+        workspace: Workspace,
+        instance: dg.DagsterInstance,
+        checks: "_Checks",
+        seen: Mapping[str, _Entry],
+    ) -> None:
+        self.system, self.workspace, self.instance = system, workspace, instance
+        self.checks, self.seen = checks, seen
+        self.inbox = workspace.inbox(system.name)
+        self.now: dict[str, _Entry] = {}
+        self.runs: list[dg.RunRequest] = []
+        self.changes: list[_Change] = []
+        self.notes: dict[str, str] = {}
+
+    def look(self) -> None:
+        """Look at everything. Raises ValueError where the inbox cannot be read."""
+        # Before the files: what is registered meanwhile has its file already.
+        registered = {
+            dimension.name: set(
+                self.instance.get_dynamic_partitions(self.system.partitions_name(dimension.name))
+            )
+            for dimension in self.system.dimensions
+        }
+        found = self.system.found(self.inbox)
+        self.notes = {
+            name: why for name, why in found.oddities.items() if _is_settled(self.inbox / name)
+        }
+        for dimension in self.system.dimensions:
+            before = registered[dimension.name]
+            keep, new = set(dimension.builtin), set(dimension.builtin) - before
+            for source in by_key(found.items[dimension.name]).values():
+                usable = self._usable(dimension, source, before)
+                keep |= set() if usable is False else {source.key}
+                new |= {source.key} - before if usable else set()
+            gone = {key for key in before - keep if self._is_gone(dimension, key)}
+            partitions = dynamic_partitions(self.system, dimension.name)
+            if new:
+                self.changes.append(partitions.build_add_request(sorted(new)))
+            if gone:
+                self.changes.append(partitions.build_delete_request(sorted(gone)))
+            self._remember(before - gone)
+
+    def _usable(self, dimension: Dimension, source: Source, registered: set[str]) -> bool | None:
+        """Whether an item can be used; None where this is not known yet."""
+        name = _name(source, self.inbox)
+        place = f"{self.system.name}/{name}"
+        before = self.seen.get(place)
+        try:
+            stamp = _stamp(source, self.inbox)
+        except FileNotFoundError:
+            return None  # Gone while it was looked at: the next look says more.
+        except (ValueError, OSError) as error:
+            self.notes[name] = str(error)
+            return False
+        if before is not None and before["stamp"] == stamp:
+            self.now[place] = before
+            if before["refused"]:
+                self.notes[name] = before["refused"]
+            return not before["refused"]
+        if stamp is None:
+            return None
+        accepted = _Entry(key=source.key, stamp=stamp, refused=None)
+        if before is None and source.key in registered:
+            self.now[place] = accepted
+            return True
+        try:
+            refused = self.checks.problem(
+                f"{place}:{stamp}", lambda: _check(self.system, dimension, source, self.workspace)
+            )
+        except TimeoutError:
+            return None
+        if not _is_still(source, self.inbox, stamp):
+            return None
+        self.now[place] = _Entry(key=source.key, stamp=stamp, refused=refused)
+        if refused:
+            self.notes[name] = refused
+            return False
+        self.runs.append(_request(self.system, dimension, source, stamp))
+        return True
+
+    def _is_gone(self, dimension: Dimension, key: str) -> bool:
+        """Whether a partition that has no usable item is to go."""
+        store = self.workspace.store
+        stored = self.system.slots_of(dimension.name, key, store)
+        return not dimension.needs_no_file(key) and not any(map(store.versions, stored))
+
+    def _remember(self, registered: set[str]) -> None:
+        """What is away for now, or on its way, and has a partition: another item that comes under
+        its name is not the command line's."""
+        for place, entry in self.seen.items():
+            if entry["key"] in registered:
+                self.now.setdefault(place, entry)
+
+
+class _Checks:
+    """Checks one after the other in a thread beside the ticks: a large file's takes minutes."""
+
+    def __init__(self) -> None:
+        self._futures: dict[str, Future[str | None]] = {}
+        self._wanted: set[str] = set()
+        self._until = 0.0
+
+    def start_tick(self) -> None:
+        """Forget what the last tick did not ask for; time starts to count."""
+        for item in self._futures.keys() - self._wanted:
+            if self._futures[item].done():
+                del self._futures[item]
+        self._wanted = set()
+        self._until = time.monotonic() + CHECK_SECONDS
+
+    def problem(self, item: str, check: Callable[[], None]) -> str | None:
+        """What is wrong with an item. Raises TimeoutError where that is not known yet."""
+        self._wanted.add(item)
+        if item not in self._futures:
+            if wait(self._futures.values(), self._left()).not_done or self._left() == 0:
+                raise TimeoutError
+            self._futures[item] = Future()
+            Thread(target=_answer, args=(self._futures[item], check), daemon=True).start()
+        problem = self._futures[item].result(self._left())
+        del self._futures[item]
+        return problem
+
+    def _left(self) -> float:
+        return max(self._until - time.monotonic(), 0.0)
+
+
+def _answer(future: Future[str | None], check: Callable[[], None]) -> None:
+    """Do a check; what it raises is the answer."""
+    try:
+        check()
+    except ValueError as error:
+        future.set_result(str(error))
+    except Exception as error:  # anything may lie in an inbox
+        future.set_result(f"it cannot be read ({type(error).__name__}: {error}).")
+    else:
+        future.set_result(None)
+
+
+def _check(system: System, dimension: Dimension, source: Source, workspace: Workspace) -> None:
+    """Raise ValueError for an item that cannot be used with the settings of its run."""
+    for plan in system.plans.values():
+        if plan.from_source and plan.by == (dimension.name,):
+            keys = {dimension.name: source.key}
+            try:
+                settings = system.resolve(
+                    plan.name, keys, workspace.store, preset=None, given={}
+                ).model_dump()
+            except StoreError:
+                continue  # The run puts that right, or says it.
+            dimension.check(source, settings)
+
+
+def _stamp(source: Source, inbox: Path) -> str | None:
+    """Names, sizes and times of an item's files; None while it may still be on its way.
+
+    Raises ValueError and OSError as `Source.contents`.
     """
-    if path.suffix.lower() not in dimension.suffixes and not (dimension.folders and path.is_dir()):
-        raise ValueError(
-            f"{path.name}: ending is {path.suffix!r}; expected one of "
-            f"{', '.join(dimension.suffixes)}."
-        )
-    dimension.check(Source.of(path), given)
-    inbox = workspace.inbox(system.name)
-    fingerprint = Source.of(path).fingerprint
-    for name in (path.name, f"{path.stem}-{fingerprint[:8]}{path.suffix}"):
-        target = inbox / name
-        if not target.exists() or Source.of(target).fingerprint == fingerprint:
-            break
-    key = Source.of(target).key
-    instance.add_dynamic_partitions(system.partitions_name(dimension.name), [key])
-    if not target.exists():
-        inbox.mkdir(parents=True, exist_ok=True)
-        beside = target.with_name(f".{target.name}.part")
-        if path.is_dir():
-            shutil.rmtree(beside, ignore_errors=True)
-            shutil.copytree(path, beside)
-        else:
-            shutil.copyfile(path, beside)
-        os.replace(beside, target)
-    return key
-
-
-def _stamp(path: Path) -> str | None:
-    """Size and time of a file, or of all in a folder; None while it may still be on its way."""
-    inside = path.rglob("*") if path.is_dir() else ()
-    statuses = [path.stat(), *(file.stat() for file in inside)]
-    newest = max(status.st_mtime_ns for status in statuses)
-    if time.time() - newest / 1e9 < SETTLED_SECONDS:
+    statuses = [(name, file.stat()) for name, file in source.contents(inbox)]
+    own = [] if source.path is None else [source.path.stat()]  # a folder's own time
+    if not all(_lies_still(status) for status in (*own, *(status for _, status in statuses))):
         return None
-    return f"{sum(status.st_size for status in statuses)}:{newest}"
+    return json_hash([[name, status.st_size, status.st_mtime_ns] for name, status in statuses])[:16]
 
 
-def _request(
-    system: System, dimension: Dimension, key: str, name: str, stamp: str
-) -> dg.RunRequest:
+def _name(source: Source, inbox: Path) -> str:
+    """An item's place, from the inbox."""
+    return "" if source.path is None else source.path.relative_to(inbox).as_posix()
+
+
+def _lies_still(status: os.stat_result) -> bool:
+    """Whether a file was not changed just now. A time in the future is a clock's fault."""
+    return abs(time.time() - status.st_mtime) >= SETTLED_SECONDS
+
+
+def _is_settled(path: Path) -> bool:
+    try:
+        return _lies_still(path.lstat())
+    except OSError:
+        return False
+
+
+def _is_still(source: Source, inbox: Path, stamp: str) -> bool:
+    try:
+        return _stamp(source, inbox) == stamp
+    except (ValueError, OSError):
+        return False
+
+
+def _write_notes(inbox: Path, notes: Mapping[str, str]) -> None:
+    """Replace the notes where they say something else."""
+    file = inbox / NOTES
+    lines = [_HEAD, ""]
+    for name, why in sorted(notes.items()):
+        line = why if why.startswith(Path(name).name) else f"{name}: {why}"
+        lines.append("".join(c if c.isprintable() else "?" for c in line))
+    text = "\n".join(lines) + "\n" if notes else ""
+    before = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+    if text == before:
+        return
+    if not text:
+        file.unlink()
+        return
+    beside = inbox / f".{NOTES}.{uuid.uuid4().hex[:8]}"
+    beside.write_text(text, encoding="utf-8")
+    os.replace(beside, file)
+
+
+def _request(system: System, dimension: Dimension, source: Source, stamp: str) -> dg.RunRequest:
     """A launch of the new item with the other dimensions' defaults."""
-    keys = {other.name: other.default for other in system.dimensions} | {dimension.name: key}
-    config = LaunchConfig(system=system.name, partitions=[keys])
+    keys = {other.name: other.default for other in system.dimensions} | {dimension.name: source.key}
+    # What was removed and is dropped again is another request: its inode's time differs.
+    changed = source.path.stat().st_ctime_ns if source.path else 0
     return dg.RunRequest(
-        run_key=f"{name}:{stamp}",
-        run_config=dg.RunConfig(ops={"launch_graph": config}),
-        tags={"tsuya/dropped": name[:60]},
+        run_key=f"{system.name}/{source.key}:{stamp}:{changed}",
+        run_config=dg.RunConfig(
+            ops={"launch_graph": LaunchConfig(system=system.name, partitions=[keys])}
+        ),
+        tags={"tsuya/dropped": f"{system.name}/{source.key}"[:60]},
     )

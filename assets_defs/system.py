@@ -20,7 +20,7 @@ from assets_defs.checks import Check
 from assets_defs.code_version import code_version
 from assets_defs.partitions import keys_of_partition, partition_folder
 from assets_defs.settings import Settings, resolve
-from assets_defs.sources import Source
+from assets_defs.sources import Found, Source, by_key, look_into
 from assets_defs.workspace import Workspace
 from storage.schemas import Schema
 from storage.versions import Slot, VersionedStore
@@ -166,8 +166,7 @@ class System:
     def sources(self, dimension: str, inbox: Path) -> dict[str, Source]:
         """Everything that a dimension has: built-in items and files in the inbox, by key."""
         builtin = {key: Source(key, None) for key in self.dimension(dimension).builtin}
-        dropped = (Source.of(path) for path in self.files(dimension, inbox))
-        return builtin | {source.key: source for source in dropped}
+        return builtin | by_key(self.files(dimension, inbox))
 
     def source(self, dimension: str, key: str, inbox: Path) -> Source:
         """The source that a key names. Raises ValueError where there is none."""
@@ -184,15 +183,13 @@ class System:
 
     def files(self, dimension: str, inbox: Path) -> list[Path]:
         """The dimension's files, or folders, in the inbox."""
-        declared = self.dimension(dimension)
-        if not inbox.is_dir():
-            return []
-        return sorted(
-            path
-            for path in inbox.iterdir()
-            if path.suffix.lower() in declared.suffixes
-            or (declared.folders and path.is_dir() and not path.name.startswith("."))
-        )
+        return self.found(inbox).items[dimension]
+
+    def found(self, inbox: Path) -> Found:
+        """What lies in the inbox: items of all dimensions, and what is none."""
+        endings = {dimension.name: dimension.suffixes for dimension in self.dimensions}
+        folders = [dimension.name for dimension in self.dimensions if dimension.folders]
+        return look_into(inbox, endings, folders)
 
     def cross_product(self, wanted: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
         """The cross product of keys by dimension."""
@@ -216,6 +213,17 @@ class System:
                     for name, key in keys.items()
                 ):
                     found.append(keys)
+        return found
+
+    def slots_of(self, dimension: str, key: str, store: VersionedStore) -> list[Slot]:
+        """Where something is stored that was made of one item, of it alone or with others."""
+        found = []
+        for slot in store.slots():
+            plan = self.plans.get(slot.asset) if slot.system == self.name else None
+            if plan is not None and dimension in plan.by:
+                keys = keys_of_partition(slot.partition, plan.by, separator=".")
+                if keys[dimension] == key:
+                    found.append(slot)
         return found
 
     def examples(self) -> list[dict[str, str]]:

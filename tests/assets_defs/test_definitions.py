@@ -22,7 +22,7 @@ from assets_defs.launcher import Request
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.partitions import partition_key
 from assets_defs.photo_fur.graph import FUR
-from assets_defs.sources import Source
+from assets_defs.sources import NOTES, Source
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.graph import STREET
 from assets_defs.system import System
@@ -291,21 +291,15 @@ def test_a_file_that_the_command_line_registered_is_not_run_twice(dropped: Any) 
     assert json.loads(tick.cursor)
 
 
-def test_a_dropped_file_that_is_no_photograph_fails_with_its_sentence(make_house: Any) -> None:
+def test_a_dropped_file_that_is_no_photograph_is_named_and_not_run(make_house: Any) -> None:
     house = make_house()
     inbox = house.workspace.inbox("photo_fur")
     inbox.mkdir(parents=True)
     (inbox / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n truncated")
     _settle(inbox / "broken.png")
-    (request,) = _tick(house, None).run_requests
-    job = house.definitions.get_repository_def().get_job("launch")
-    done = job.execute_in_process(
-        run_config=request.run_config, instance=house.instance, raise_on_error=False
-    )
-    assert not done.success
-    failure = next(event for event in done.all_events if event.is_step_failure)
-    assert "broken.png" in str(failure.step_failure_data.error)
-    assert list(house.workspace.store.slots()) == []
+    assert _tick(house, None).run_requests == []
+    assert "broken.png: content is truncated" in (inbox / NOTES).read_text()
+    assert "broken-png" not in house.instance.get_dynamic_partitions("photo_fur_photo")
 
 
 @pytest.mark.parametrize("kind", ["zip", "folder"])
