@@ -219,7 +219,7 @@ def impossible_share(radiance: NDArray[np.floating]) -> float:
     return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
     rows, columns = found.shape
     for i in range(len(u)):
@@ -228,7 +228,7 @@ def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
         found[row, sampling.phi_bin(v, n, columns)] += 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _expected(lobe, place, view, rows, columns):  # type: ignore[no-untyped-def]
     """Integral of the density over cells of equal quantile and equal phi, by the midpoints of
     narrow strips: the measure of a direction is dphi cos theta dtheta."""

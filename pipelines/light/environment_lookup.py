@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pipelines.light.environment_maps import FloatArray, Radiance
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def texel_of_direction(height: int, width: int, x: float, y: float, z: float) -> tuple[int, int]:
     """Row and column that hold a direction; it need not be a unit vector.
 
@@ -30,7 +30,7 @@ def texel_of_direction(height: int, width: int, x: float, y: float, z: float) ->
     return row, column
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def radiance_from_direction(
     radiance: Radiance, x: float, y: float, z: float
 ) -> tuple[float, float, float]:
@@ -39,7 +39,7 @@ def radiance_from_direction(
     return radiance[row, column, 0], radiance[row, column, 1], radiance[row, column, 2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_radiance(radiance: Radiance, directions: FloatArray, found: Radiance) -> None:
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]

@@ -102,7 +102,7 @@ def direction_pdfs(sampler: EnvironmentSampler, directions: ArrayLike) -> FloatA
 # ---- compiled --------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _drawn(cdf: FloatArray, u: float) -> tuple[int, float]:
     """Interval of a cdf (n + 1,) that holds u, and the place in it, off its ends."""
     low, high = 0, cdf.shape[0] - 1
@@ -118,7 +118,7 @@ def _drawn(cdf: FloatArray, u: float) -> tuple[int, float]:
     return low, min(place, 1.0 - _MARGIN)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def sample_direction(
     row_cdf: FloatArray, column_cdf: FloatArray, density: FloatArray, u1: float, u2: float
 ) -> tuple[float, float, float, float]:
@@ -145,14 +145,14 @@ def sample_direction(
     return radius * math.cos(azimuth), radius * math.sin(azimuth), z, density[row, column]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def direction_pdf(density: FloatArray, x: float, y: float, z: float) -> float:
     """Density per steradian of ``sample_direction`` at a direction; ``density`` is (H, W)."""
     row, column = texel_of_direction(density.shape[0], density.shape[1], x, y, z)
     return density[row, column]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_samples(
     row_cdf: FloatArray,
     column_cdf: FloatArray,
@@ -166,7 +166,7 @@ def _fill_samples(
         directions[i, 0], directions[i, 1], directions[i, 2], found[i] = x, y, z, p
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_density(density: FloatArray, directions: FloatArray, found: FloatArray) -> None:
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]

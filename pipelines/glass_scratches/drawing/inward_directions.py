@@ -15,7 +15,7 @@ from pipelines.glass_scratches.drawing.vectors import divided, dot, row_vector, 
 from pipelines.light.environment_sampling import direction_pdf, sample_direction
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def aimed_inward(environment, flats, normal, index, numbers):  # type: ignore[no-untyped-def]
     """A direction (x, y, z) below the surface, towards what is bright outside.
 
@@ -34,7 +34,7 @@ def aimed_inward(environment, flats, normal, index, numbers):  # type: ignore[no
     return stepped(way, -2.0 * above, normal) if above > 0.0 else way
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def inward_pdf(environment, flats, normal, index, way):  # type: ignore[no-untyped-def]
     """Density per steradian of directions (x, y, z), half by the cosine and half aimed."""
     axes = _axis_count(flats, normal)
@@ -60,7 +60,7 @@ def inward_pdf(environment, flats, normal, index, way):  # type: ignore[no-untyp
     return density
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _axis_count(flats, normal):  # type: ignore[no-untyped-def]
     axes = 1
     for flat in range(len(flats)):
@@ -69,7 +69,7 @@ def _axis_count(flats, normal):  # type: ignore[no-untyped-def]
     return axes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _axis(flats, normal, number):  # type: ignore[no-untyped-def]
     """The surface's own normal, then those of flat faces that are not parallel to it."""
     if number == 0:

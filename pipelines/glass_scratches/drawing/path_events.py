@@ -49,7 +49,7 @@ def advance_paths(first, last, glass, paths, hits, depth, results):  # type: ign
             _meet_glass(glass, paths, i, hits, depth, results)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_environment(glass, paths, i, results):  # type: ignore[no-untyped-def]
     """The environment's radiance; shared by the balance heuristic where shadow rays look for it."""
     environment, number = glass.environment, paths.number[i]
@@ -63,7 +63,7 @@ def _add_environment(glass, paths, i, results):  # type: ignore[no-untyped-def]
     results.radiance[number, 2] += paths.throughput[i, 2] * b * share
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _meet_glass(glass, paths, i, hits, depth, results):  # type: ignore[no-untyped-def]
     surface = glass.surface
     event = PathEvent(paths.seed[i], paths.number[i], glass.samples, depth)
@@ -93,7 +93,7 @@ def _meet_glass(glass, paths, i, hits, depth, results):  # type: ignore[no-untyp
         results.alive[i] = _survives(paths, i, event)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _surface_point(faces, paths, i, hits):  # type: ignore[no-untyped-def]
     triangle = hits.triangle[i]
     came, face = row_vector(paths.direction, i), row_vector(faces.normals, triangle)
@@ -110,13 +110,13 @@ def _surface_point(faces, paths, i, hits):  # type: ignore[no-untyped-def]
     return SurfacePoint(position, face, normal, 1.0 if outside else -1.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lobe_place(lobe, across):  # type: ignore[no-untyped-def]
     """The lobe's number for a place across the opening, in [-1, 1]."""
     return min(max(int((across + 1.0) / 2.0 * len(lobe.rho)), 0), len(lobe.rho) - 1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _survives(paths, i, event):  # type: ignore[no-untyped-def]
     """Russian roulette: whether a path that has come far goes on, for those that do not."""
     if event.depth < _ROULETTE_FROM:

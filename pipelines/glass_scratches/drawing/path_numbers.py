@@ -28,7 +28,7 @@ class PathEvent(NamedTuple):
     depth: int
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def mixed(z):  # type: ignore[no-untyped-def]
     """splitmix64's output function."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -36,13 +36,13 @@ def mixed(z):  # type: ignore[no-untyped-def]
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def unit(z):  # type: ignore[no-untyped-def]
     """The upper 53 bits of a number as a double in [0, 1)."""
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def permuted(index, count, key):  # type: ignore[no-untyped-def]
     """Where a permutation of 0 … count - 1, one for each key, sends an index.
 
@@ -65,7 +65,7 @@ def permuted(index, count, key):  # type: ignore[no-untyped-def]
             return np.int64(x)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _pair(pixel_seed, sample, samples, pair):  # type: ignore[no-untyped-def]
     """Two numbers of the R2 sequence (Roberts), its order and origin at random for pixel, pair."""
     h = mixed(pixel_seed + np.uint64(pair + 1) * np.uint64(0x9E3779B97F4A7C15))
@@ -75,7 +75,7 @@ def _pair(pixel_seed, sample, samples, pair):  # type: ignore[no-untyped-def]
     return u - np.floor(u), v - np.floor(v)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, parallel=True)
 def jitter_pixels(pixels, samples, seed, jitter, seeds):  # type: ignore[no-untyped-def]
     """Fill ``jitter`` (pixels * samples, 2), places in the pixels, and ``seeds`` of the pixels."""
     for row in prange(len(pixels)):
@@ -88,7 +88,7 @@ def jitter_pixels(pixels, samples, seed, jitter, seeds):  # type: ignore[no-unty
             seeds[number] = pixel_seed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def path_numbers(event, pair):  # type: ignore[no-untyped-def]
     """Two numbers for a path's event: stratified over the pixel's paths at first, then random."""
     seed, samples = event.seed, event.samples

@@ -26,7 +26,7 @@ class ScratchHere(NamedTuple):
     angle: float
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def projection_axis(normal, u):  # type: ignore[no-untyped-def]
     """The axis that a tile is laid on from, at random by the fourth power of the normal."""
     x, y, z = normal[0] ** 4, normal[1] ** 4, normal[2] ** 4
@@ -36,7 +36,7 @@ def projection_axis(normal, u):  # type: ignore[no-untyped-def]
     return 1 if pick < x + y else 2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def tile_point(point, axis, tile):  # type: ignore[no-untyped-def]
     """The place (x, y) in the tile of a point of the surface, seen along an axis."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
@@ -47,7 +47,7 @@ def tile_point(point, axis, tile):  # type: ignore[no-untyped-def]
     return x, y
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def scratch_here(surface, place, width, u, v):  # type: ignore[no-untyped-def]
     """The scratch at a place (x, y) of the tile, for a cone so many tiles wide.
 

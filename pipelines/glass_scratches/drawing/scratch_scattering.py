@@ -59,7 +59,7 @@ class _View(NamedTuple):
     out_chance: float
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fresnel_factor(surface, direction):  # type: ignore[no-untyped-def]
     """F of a view (u, v, n) by Eq. 3 and 4, with F = 1 at theta_o = pi / 2."""
     u, v, n = direction
@@ -69,7 +69,7 @@ def fresnel_factor(surface, direction):  # type: ignore[no-untyped-def]
     return share + (1.0 - share) * surface.head_on[view]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def scratch_frame(normal, axis, angle):  # type: ignore[no-untyped-def]
     """Whether a scratch has a direction on the surface, and its frame.
 
@@ -90,7 +90,7 @@ def scratch_frame(normal, axis, angle):  # type: ignore[no-untyped-def]
     return True, Frame(along, cross(normal, along), normal)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def scatter(glass, paths, i, at, event, u, results):  # type: ignore[no-untyped-def]
     """Light at a scratch: what the environment sends directly, and where path i goes on; returns
     whether it does.
@@ -123,7 +123,7 @@ def scatter(glass, paths, i, at, event, u, results):  # type: ignore[no-untyped-
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _leave_or_reflect(surface, paths, i, frame, u):  # type: ignore[no-untyped-def]
     """At the mirror-like part of a scratch's walls, from inside: out again where the smooth surface
     would let it out, by 1 - F of the way outside (so it is reciprocal), or back."""
@@ -141,7 +141,7 @@ def _leave_or_reflect(surface, paths, i, frame, u):  # type: ignore[no-untyped-d
     set_row(paths.direction, i, stepped(came, -2.0 * up, frame.normal))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _view(surface, at, came):  # type: ignore[no-untyped-def]
     u, v, n = _in_frame(at.frame, came)
     direction = Direction(-u, -v, -n)
@@ -153,7 +153,7 @@ def _view(surface, at, came):  # type: ignore[no-untyped-def]
     return _View(direction, fresnel, returned, out_chance)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_light(glass, paths, i, at, view, event, results):  # type: ignore[no-untyped-def]
     """A direction drawn from the environment, weighted by the balance heuristic: to be added where
     its shadow ray meets nothing."""
@@ -182,7 +182,7 @@ def _add_light(glass, paths, i, at, view, event, results):  # type: ignore[no-un
         results.shadow_radiance[i, 2] = paths.throughput[i, 2] * gain * b
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scattered_out(glass, at, view, event, u_theta):  # type: ignore[no-untyped-def]
     """A direction outside, what light from there is multiplied with, and its density."""
     surface = glass.surface
@@ -208,14 +208,14 @@ def _scattered_out(glass, at, view, event, u_theta):  # type: ignore[no-untyped-
     return way, gain / view.out_chance, density
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _bent(view, index):  # type: ignore[no-untyped-def]
     """Where the smooth surface would bend a view's ray to, inside."""
     u, v = -view.u / index, -view.v / index
     return Direction(u, v, -np.sqrt(max(1.0 - u * u - v * v, 0.0)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scattered_in(glass, at, view, event, pick):  # type: ignore[no-untyped-def]
     """A direction inside, of walls that scatter evenly, and what light from there is multiplied
     with; ``pick`` in [0, 1) chooses how it is drawn."""
@@ -239,24 +239,24 @@ def _scattered_in(glass, at, view, event, pick):  # type: ignore[no-untyped-def]
     return inward, gain * (-inward.n / np.pi / density if density > 0.0 else 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cosine_direction(u1, u2):  # type: ignore[no-untyped-def]
     radius, turn = np.sqrt(u1), 2.0 * np.pi * u2
     return Direction(radius * np.cos(turn), radius * np.sin(turn), np.sqrt(max(1.0 - u1, 0.0)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _even_direction(u1, u2):  # type: ignore[no-untyped-def]
     radius, turn = np.sqrt(max(1.0 - u1 * u1, 0.0)), 2.0 * np.pi * u2
     return Direction(radius * np.cos(turn), radius * np.sin(turn), u1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _in_frame(frame, vector):  # type: ignore[no-untyped-def]
     return Direction(dot(vector, frame.along), dot(vector, frame.across), dot(vector, frame.normal))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _in_scene(frame, direction):  # type: ignore[no-untyped-def]
     u, v, n = direction
     return stepped(stepped(scaled(u, frame.along), v, frame.across), n, frame.normal)

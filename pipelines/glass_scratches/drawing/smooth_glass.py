@@ -15,7 +15,7 @@ from pipelines.glass_scratches.drawing.vectors import (
 )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def reflectance(cosine, ratio):  # type: ignore[no-untyped-def]
     """Fresnel's reflectance of unpolarised light and the cosine behind the surface.
 
@@ -30,7 +30,7 @@ def reflectance(cosine, ratio):  # type: ignore[no-untyped-def]
     return 0.5 * (along * along + across * across), behind
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def reflect_or_refract(paths, i, point, index, u, depth):  # type: ignore[no-untyped-def]
     """Send path i on; of what is seen first, a quarter is reflected and a quarter refracted at
     least."""

@@ -12,7 +12,7 @@ import math
 from numba import njit
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def across_arc(px: float, py: float, curvature: float) -> float:
     """v of a point (px, py)."""
     if curvature == 0.0:
@@ -23,7 +23,7 @@ def across_arc(px: float, py: float, curvature: float) -> float:
     return (2.0 * py - curvature * (px * px + py * py)) / (1.0 + h)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def along_arc(px: float, py: float, curvature: float) -> float:
     """u of a point (px, py)."""
     if curvature == 0.0:
@@ -31,13 +31,13 @@ def along_arc(px: float, py: float, curvature: float) -> float:
     return math.atan2(curvature * px, 1.0 - curvature * py) / curvature
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def arc_coordinates(px: float, py: float, curvature: float) -> tuple[float, float]:
     """u, v of a point (px, py)."""
     return along_arc(px, py, curvature), across_arc(px, py, curvature)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def arc_point(u: float, v: float, curvature: float) -> tuple[float, float]:
     """The point (px, py) at u, v."""
     if curvature == 0.0:

@@ -77,7 +77,7 @@ def flatten_mips(levels: list[FloatArray]) -> tuple[FloatArray, NDArray[np.int64
 # ---- compiled ----------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _mean_opacity(
     arrays: LayerArrays, layer: int, row: int, column: int, resolution: int, samples: int
 ) -> float:
@@ -93,7 +93,7 @@ def _mean_opacity(
     return total / samples
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def mean_opacities(arrays: LayerArrays, samples: int, out: NDArray[np.float32]) -> None:
     """Fill out (L, R, R) with the mean opacity of ``samples`` points in each texel."""
     resolution = out.shape[1]
@@ -105,7 +105,7 @@ def mean_opacities(arrays: LayerArrays, samples: int, out: NDArray[np.float32]) 
             )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _visible_area(arrays: LayerArrays, layer: int, i: int, points: int) -> float:
     shape = arrays.shapes[i]
     shift, other = hashed(arrays.seed[i], -2), hashed(arrays.seed[i], -3)
@@ -124,7 +124,7 @@ def _visible_area(arrays: LayerArrays, layer: int, i: int, points: int) -> float
     return math.pi * shape[HALF_LENGTH] * shape[HALF_WIDTH] * total / points
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def visible_areas(arrays: LayerArrays, layer: int, points: int, out: NDArray[np.float64]) -> None:
     """Fill out (n,) with the area, times opacity, in which each of the layer's features is nearest.
 
@@ -135,7 +135,7 @@ def visible_areas(arrays: LayerArrays, layer: int, points: int, out: NDArray[np.
         out[i] = _visible_area(arrays, layer, i, points)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def filtered_coverage(
     flat_pyramid: NDArray[np.float32],
     offsets: NDArray[np.int64],

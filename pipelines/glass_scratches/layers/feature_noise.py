@@ -11,7 +11,7 @@ KNOTS = 7.0
 """Knots of the noise along a scratch, end to end: gaps of about a seventh of it and more."""
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def hashed(a: int, b: int) -> float:
     """Hash two numbers to [0, 1): splitmix64's output function on both halves of a word."""
     z = (np.uint64(a) << np.uint64(32)) ^ np.uint64(b & 0xFFFFFFFF)
@@ -22,7 +22,7 @@ def hashed(a: int, b: int) -> float:
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def noise_along(seed: int, place: float) -> float:
     """Smooth noise in [0, 1], one knot a unit, uniformly distributed at every place.
 

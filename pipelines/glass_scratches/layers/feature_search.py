@@ -65,7 +65,7 @@ class _Wear(NamedTuple):
     breaks: float
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _state_along(
     strength: float, seed: int, is_dig: bool, wear: _Wear, s: float
 ) -> tuple[float, float]:
@@ -88,7 +88,7 @@ def _state_along(
     return opacity, wide
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cell_span(
     cell_start: NDArray[np.int64], cells: int, layer: int, x: float, y: float
 ) -> tuple[int, int]:
@@ -98,7 +98,7 @@ def _cell_span(
     return cell_start[cell], cell_start[cell + 1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _nearest(
     shapes: NDArray[np.float32],
     seed: NDArray[np.uint32],
@@ -135,7 +135,7 @@ def _nearest(
     return found, opacity, max(-1.0, min(across, 1.0)), along
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def nearest_feature(
     arrays: LayerArrays, layer: int, x: float, y: float
 ) -> tuple[int, float, float, float]:
@@ -152,7 +152,7 @@ def nearest_feature(
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _direction(
     angle: NDArray[np.float32],
     turn: NDArray[np.float32],
@@ -164,7 +164,7 @@ def _direction(
     return angle[layer] + turn[i] + shapes[i, CURVATURE] * along if i >= 0 else 0.0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def scratch_at(arrays: LayerArrays, layer: int, x: float, y: float) -> tuple[float, float, float]:
     """Opacity in [0, 1], place across in [-1, 1] and direction (radians) of a layer at a point.
 

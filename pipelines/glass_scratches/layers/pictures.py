@@ -89,7 +89,7 @@ def _noise(shapes: NDArray[np.float32], threshold: float, size: int) -> NDArray[
     return threshold * np.sqrt(squared)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _lower(shapes: NDArray[np.float32], reach: float, squared: NDArray[np.float64]) -> None:
     """Lower ``squared`` to the square of the normalised distance to the nearest feature.
 

@@ -20,7 +20,7 @@ from pipelines.glass_scratches.layers.feature_search import (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _list_cells(
     shape: NDArray[np.float32],
     item: int,
@@ -70,7 +70,7 @@ def _list_cells(
                     cursor[cell] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def count_cells(
     shapes: NDArray[np.float32], layer: NDArray[np.int32], cells: int, count: NDArray[np.int64]
 ) -> None:
@@ -80,7 +80,7 @@ def count_cells(
         _list_cells(shapes[i], i, cells, count[layer[i]], nothing)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill_cells(
     shapes: NDArray[np.float32],
     layer: NDArray[np.int32],

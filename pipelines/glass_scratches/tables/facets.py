@@ -91,13 +91,13 @@ def _distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.hypot(step[..., 0], step[..., 1])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _turn(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
     """Twice the area of a triangle: positive where c lies left of the line from a to b."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _leaves_inwards(ends, vertex, wx, wy, tolerance):  # type: ignore[no-untyped-def]
     """Whether a step (wx, wy) from a vertex of the profile goes into the scratch, or along it."""
     last = len(ends) - 1
@@ -116,7 +116,7 @@ def _leaves_inwards(ends, vertex, wx, wy, tolerance):  # type: ignore[no-untyped
     return left_of_next or left_of_before
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _blocked(profile, ax, ay, bx, by, tolerance):  # type: ignore[no-untyped-def]
     """Whether the line from a to b leaves the scratch between its ends: by properly crossing a
     piece of the profile, or through one of its points, where that is not just grazed."""
@@ -145,7 +145,7 @@ def _blocked(profile, ax, ay, bx, by, tolerance):  # type: ignore[no-untyped-def
     return False
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _seen(ends, profile):  # type: ignore[no-untyped-def]
     """(V, V) bool: whether the straight line between two vertices stays inside."""
     count = len(ends)
@@ -167,7 +167,7 @@ def _seen(ends, profile):  # type: ignore[no-untyped-def]
     return seen
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _least_sum(left, right):  # type: ignore[no-untyped-def]
     """Matrix product with + for times and the minimum for the sum."""
     rows, inner = left.shape
@@ -184,7 +184,7 @@ def _least_sum(left, right):  # type: ignore[no-untyped-def]
     return least
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _beyond(ends, inner, to_bends, ways, profile):  # type: ignore[no-untyped-def]
     """(V, K): least, over the places where the string may leave for infinity, of its length."""
     count, directions = len(ends), len(ways)

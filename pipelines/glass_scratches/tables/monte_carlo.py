@@ -106,7 +106,7 @@ def table_of_counts(counts: PathCounts) -> PathTable:
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _next(state):  # type: ignore[no-untyped-def]
     """One step of splitmix64: new state, and a double in [0, 1)."""
     state = state + np.uint64(0x9E3779B97F4A7C15)
@@ -117,7 +117,7 @@ def _next(state):  # type: ignore[no-untyped-def]
     return state, np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _folded(sine):  # type: ignore[no-untyped-def]
     """A number reflected at -1 and 1 until it lies between."""
     turn = np.fmod(sine + 1.0, 4.0)
@@ -158,13 +158,13 @@ def _walls(profile: NDArray[np.float64], albedo: float, blur: float) -> _Walls:
     return _Walls(x, y, dx / length, dy / length, length, opening, albedo, blur)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, parallel=True)
 def _shoot(walls, sines, chosen, seed, counts):  # type: ignore[no-untyped-def]
     for number in prange(len(chosen)):
         _shoot_from(walls, sines, chosen[number], seed, counts)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shoot_from(walls, sines, bin_in, seed, counts):  # type: ignore[no-untyped-def]
     """Count the paths of all rays from one bin."""
     state = np.uint64(seed) * np.uint64(0xD1342543DE82EF95) + np.uint64(bin_in + 1) * np.uint64(
@@ -201,7 +201,7 @@ def _shoot_from(walls, sines, bin_in, seed, counts):  # type: ignore[no-untyped-
             own[out] = 0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-untyped-def]
     """Follow a path that meets a piece so far along: random state, and the bin that it leaves into.
 
@@ -223,7 +223,7 @@ def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-unty
     return state, _LOST
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _bounced_sine(sine, blur, state):  # type: ignore[no-untyped-def]
     """Random state, and the sine after a bounce, to the facet's normal, of the one before."""
     state, u = _next(state)
@@ -236,7 +236,7 @@ def _bounced_sine(sine, blur, state):  # type: ignore[no-untyped-def]
     return state, sine
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _bounced_ray(walls, piece, along, sine):  # type: ignore[no-untyped-def]
     """The ray that leaves a piece, so far along it, by the sine of its angle to the normal."""
     tx, ty = walls.along_x[piece], walls.along_y[piece]
@@ -250,7 +250,7 @@ def _bounced_ray(walls, piece, along, sine):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _hit(walls, ray):  # type: ignore[no-untyped-def]
     """The piece that a ray meets first from its inner side, and how far along; -1 for none."""
     nearest, found, where = np.inf, -1, 0.0

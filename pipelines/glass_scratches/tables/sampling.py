@@ -22,21 +22,21 @@ from numba import njit
 from pipelines.glass_scratches.tables.lobe import Direction
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def phi_bin(v, n, bins):  # type: ignore[no-untyped-def]
     """The bin of a direction's phi."""
     angle = np.arctan2(v, max(n, 0.0))
     return min(max(int((angle / np.pi + 0.5) * bins), 0), bins - 1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def theta_quantile(u):  # type: ignore[no-untyped-def]
     """Share of cos² theta below the theta whose sine is u."""
     s = min(max(u, -1.0), 1.0)
     return 0.5 + (np.arcsin(s) + s * np.sqrt(1.0 - s * s)) / np.pi
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sine_of_quantile(c):  # type: ignore[no-untyped-def]
     """The sine whose quantile is c: Newton's method on the angle, held inside by bisection."""
     low, high = -np.pi / 2, np.pi / 2
@@ -55,7 +55,7 @@ def sine_of_quantile(c):  # type: ignore[no-untyped-def]
     return np.sin(theta)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def theta_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
     """k as a density over the light's quantile, for the view's."""
     if np.isinf(blur):
@@ -77,7 +77,7 @@ def theta_kernel(c_view, c_light, blur):  # type: ignore[no-untyped-def]
     return total / (blur * np.sqrt(2.0 * np.pi))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def evaluate(lobe, place, view, light):  # type: ignore[no-untyped-def]
     """f of a view and a light (:class:`Direction`), 1/sr; 0 below the surface."""
     ou, ov, on = view
@@ -89,7 +89,7 @@ def evaluate(lobe, place, view, light):  # type: ignore[no-untyped-def]
     return 2.0 / np.pi**2 * table * theta_kernel(theta_quantile(ou), theta_quantile(iu), lobe.blur)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def pdf(lobe, place, view, light):  # type: ignore[no-untyped-def]
     """Density per steradian with which :func:`sample` returns the light."""
     _, ov, on = view
@@ -102,7 +102,7 @@ def pdf(lobe, place, view, light):  # type: ignore[no-untyped-def]
     return evaluate(lobe, place, view, light) * i_n / kept
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def sample(lobe, place, view, u1, u2, u3):  # type: ignore[no-untyped-def]
     """A light for the view, from numbers u1, u2, u3 in [0, 1), u3 only where k = 1.
 
@@ -126,7 +126,7 @@ def sample(lobe, place, view, u1, u2, u3):  # type: ignore[no-untyped-def]
     return Direction(along, rest * sine, rest * np.sqrt(max(1.0 - sine * sine, 0.0)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sampled_theta_sine(view_sine, blur, u2, u3):  # type: ignore[no-untyped-def]
     """The sine of a light's theta, drawn for that of a view."""
     if np.isinf(blur):

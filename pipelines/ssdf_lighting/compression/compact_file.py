@@ -153,7 +153,7 @@ def _summed(steps: Codes, ranks: Codes) -> Codes:
     return (sums[1:] - np.repeat(sums[starts], ranks)).astype(np.int32)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _moved_to_front(cluster: Codes, count: int) -> Codes:
     """Places in a list in which the last one used is the first."""
     recent = np.arange(count)
@@ -168,7 +168,7 @@ def _moved_to_front(cluster: Codes, count: int) -> Codes:
     return moved
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _moved_back(moved: Codes, count: int) -> Codes:
     recent = np.arange(count)
     cluster = np.empty(len(moved), np.int32)

@@ -63,7 +63,7 @@ def lobe_axes(
     return axes
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def _at_vertex(
     point: Array, n: Array, material: int, eye: Array, sources: _Sources, axes: Array
 ) -> None:

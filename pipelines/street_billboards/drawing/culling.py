@@ -62,7 +62,7 @@ def _planes(intrinsics: NDArray[np.float64], width: int, height: int) -> NDArray
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _distances(
     centre: NDArray[np.float64],
     turns: NDArray[np.bool_],

@@ -196,8 +196,7 @@ def alternate_least_squares(
     values, counted (n, P); factors as `truncated_svd` leaves them. Does nothing where every texel
     counts alike: then the start is the answer.
     """
-    _, weights, images = factors
-    rank = len(images)
+    rank = len(factors.images)
     if rank == 0 or (counted == counted[0, 0]).all():
         return
     for _ in range(sweeps):

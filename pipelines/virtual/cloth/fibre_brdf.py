@@ -41,13 +41,13 @@ F90_PER_F0 = 50.0
 _HALF_FIFTH_MEAN = 5.0 / 28.0  # cosine-weighted mean of (1 - c/2)^5 over the hemisphere
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def grazing_fresnel(f0: float) -> float:
     """F90 of Schlick's Fresnel term: how a surface of this F0 mirrors at grazing incidence."""
     return min(1.0, F90_PER_F0 * f0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def microfacet_lobe(
     ix: float, iy: float, iz: float, ox: float, oy: float, oz: float, along: float, across: float
 ) -> tuple[float, float]:
@@ -67,7 +67,7 @@ def microfacet_lobe(
     return lobe, square * square * grazing
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def diffuse_falloff(cosine: float) -> float:
     """Evaluate (1 - c/2)^5 of Ashikhmin and Shirley's diffuse lobe."""
     base = 1.0 - 0.5 * cosine
@@ -75,19 +75,19 @@ def diffuse_falloff(cosine: float) -> float:
     return square * square * base
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def transmitted(f0: float, falloff: float) -> float:
     """T: what is left for the diffuse lobe; ``falloff`` is `diffuse_falloff` of the cosine."""
     return 1.0 - f0 - (grazing_fresnel(f0) - f0) * falloff
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def mean_transmitted(f0: float) -> float:
     """T_mean: the cosine-weighted mean of T over the hemisphere."""
     return transmitted(f0, _HALF_FIFTH_MEAN)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _reflectance(
     light: np.ndarray,
     view: np.ndarray,

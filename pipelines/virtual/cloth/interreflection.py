@@ -14,7 +14,7 @@ from pipelines.virtual.cloth.fibre_brdf import diffuse_falloff, transmitted
 from pipelines.virtual.cloth.shading import FloatArray, light_is_above
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def vertex_irradiance(
     normals: FloatArray,
     specular: FloatArray,
@@ -38,7 +38,7 @@ def vertex_irradiance(
                 row += 1
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def gather_interreflection(
     triangle: NDArray[np.int32],
     barycentric: FloatArray,

@@ -61,13 +61,13 @@ class ShadingPoints(NamedTuple):
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _scaled(x: float, y: float, z: float, sign: float) -> tuple[float, float, float]:
     scale = sign / max(math.sqrt(x * x + y * y + z * z), 1e-30)
     return scale * x, scale * y, scale * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _interpolated(
     values: FloatArray, corner: NDArray[np.int32], weight: FloatArray
 ) -> tuple[float, float, float]:
@@ -81,7 +81,7 @@ def _interpolated(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _triangle_normal(vertices: FloatArray, corner: NDArray[np.int32]) -> tuple[float, float, float]:
     a, b, c = corner[0], corner[1], corner[2]
     px, py, pz = vertices[a, 0], vertices[a, 1], vertices[a, 2]
@@ -90,7 +90,7 @@ def _triangle_normal(vertices: FloatArray, corner: NDArray[np.int32]) -> tuple[f
     return _scaled(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _across_fibre(
     tx: float, ty: float, tz: float, nx: float, ny: float, nz: float
 ) -> tuple[float, float, float]:
@@ -105,7 +105,7 @@ def _across_fibre(
     return _scaled(tx, ty, tz, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _find_point(
     origin: FloatArray,
     direction: FloatArray,
@@ -159,7 +159,7 @@ def _find_point(
         points.roughness[i, k] = total
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def find_shading_points(
     origins: FloatArray,
     direction: FloatArray,
@@ -176,7 +176,7 @@ def find_shading_points(
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def light_is_above(facing: FloatArray, normal: FloatArray, light: FloatArray) -> bool:
     """Tell whether a light is above both the triangle and the smooth surface."""
     return (
@@ -185,7 +185,7 @@ def light_is_above(facing: FloatArray, normal: FloatArray, light: FloatArray) ->
     )
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def count_lights_above(
     facing: FloatArray, normal: FloatArray, lights: FloatArray, count: NDArray[np.int64]
 ) -> None:
@@ -197,7 +197,7 @@ def count_lights_above(
         count[i] = number
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def list_shadow_rays(
     position: FloatArray,
     facing: FloatArray,
@@ -218,7 +218,7 @@ def list_shadow_rays(
                 row += 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _shade_point(
     points: ShadingPoints,
     i: int,
@@ -266,7 +266,7 @@ def _shade_point(
             out[light, c] += share * iz * value
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy", parallel=True)
 def shade(
     points: ShadingPoints,
     begin: int,

@@ -73,7 +73,7 @@ class _Vertex(NamedTuple):
     albedo: int
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def scatter(
     hits: FirstHits,
     origins: FloatArray,
@@ -109,7 +109,7 @@ def scatter(
         _send_on(vertex, light, fibres.albedo, out, i)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _source_direction(u: float, v: float, exponent: float) -> _Vector:
     """Draw a direction to the source with density (n + 1) / (2 pi) cos^n."""
     z = u ** (1 / (exponent + 1))
@@ -117,20 +117,20 @@ def _source_direction(u: float, v: float, exponent: float) -> _Vector:
     return r * math.cos(2 * math.pi * v), r * math.sin(2 * math.pi * v), z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _disc_point(u: float, v: float) -> _DiscPoint:
     r = math.sqrt(u)
     a, b = r * math.cos(2 * math.pi * v), r * math.sin(2 * math.pi * v)
     return _DiscPoint(a, b, math.sqrt(max(1e-6, 1 - a * a)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _at_the_source() -> _Vertex:
     """Nothing was hit but the source, whose light has been sampled before: the path ends."""
     return _Vertex((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _on_the_skin(x: float, y: float, row: int, source: float, disc: _DiscPoint) -> _Vertex:
     """Lambertian; ``source``: weight of the light times its cosine."""
     a, b = disc.x, disc.y
@@ -138,7 +138,7 @@ def _on_the_skin(x: float, y: float, row: int, source: float, disc: _DiscPoint) 
     return _Vertex((x, y, 0.0), (a, b, up), 0.0, 0.0, source / math.pi, 1.0, row)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fibre_point(fibres: Fibres, hits: FirstHits, i: int) -> _FibrePoint:
     """The point of a hair's axis beside hit ``i``."""
     faces = len(fibres.segment)
@@ -156,7 +156,7 @@ def _fibre_point(fibres: Fibres, hits: FirstHits, i: int) -> _FibrePoint:
     return _FibrePoint((px, py, pz), (scale * tx, scale * ty, scale * tz), radius, hair)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _on_a_fibre(
     point: _FibrePoint,
     view: _Vector,
@@ -200,7 +200,7 @@ def _on_a_fibre(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _send_on(vertex: _Vertex, light: _Vector, albedo: FloatArray, out: Scattered, i: int) -> None:
     """Write row i. Both rays go on from inside the tile, around which there are copies."""
     px, py, pz = vertex.place
@@ -221,7 +221,7 @@ def _send_on(vertex: _Vertex, light: _Vector, albedo: FloatArray, out: Scattered
         out.next_weight[i, channel] = vertex.goes_on * albedo[vertex.albedo, channel]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _along(curves: FloatArray, hair: int, s: int, f: float) -> _Vector:
     """Interpolate (H, P, 3) figures of a hair at the fraction f of its segment s."""
     return (
@@ -231,7 +231,7 @@ def _along(curves: FloatArray, hair: int, s: int, f: float) -> _Vector:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _exit_distance(radius: float, sine: float) -> float:
     """How far a ray from a tube's axis has to go to be outside; bounded along the tube."""
     return 1.02 * radius / max(sine, 0.15)
