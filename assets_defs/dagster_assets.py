@@ -174,6 +174,8 @@ def _evaluated(check: Check, version: StoredVersion) -> dg.AssetCheckResult:
     except DamagedError as error:
         # No verdict on this version: what was read is not what was checked, or made from.
         raise damage_failure(store, error) from error
+    except StoreError as error:
+        raise dg.Failure(description=str(error), allow_retries=False) from error
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         store.reject(slot, version.version, check.name, reason)

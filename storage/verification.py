@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from storage import zarr_files
 from storage.errors import DamagedError
-from storage.versions import STORED, Slot, VersionedStore
+from storage.versions import Slot, VersionedStore
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ def verify_slot(store: VersionedStore, slot: Slot) -> Iterator[Finding]:
         try:
             zarr_files.verify(store.folder(slot, version))
         except DamagedError as error:
-            if not store.verdicts(slot, version).get(STORED, {}).get("passed", True):
-                continue  # It is out of use already.
+            if not store.is_in_use(slot, version):
+                continue
             current = store.discard(error)
             done = f"out of use: {current or 'none'} is current"
             yield Finding(slot, f"versions/{version}: {error.what}", done)

@@ -230,6 +230,10 @@ class VersionedStore:
         except DamagedError:
             return {}
 
+    def is_in_use(self, slot: Slot, version: str) -> bool:
+        """Whether a version has not been found damaged."""
+        return bool(self.verdicts(slot, version).get(STORED, {}).get("passed", True))
+
     def pass_version(self, slot: Slot, version: str, check: str, figure: float | None) -> None:
         """Note that a check passed; the last one that was waited for makes the version current."""
         files = self.files(slot)

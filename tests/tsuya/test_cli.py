@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,13 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
+from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import Workspace
+from storage.schemas import systems
 from storage.zarr_files import open_dataset
 from tsuya.cli import main
 from tsuya.gallery import write_pictures
+from tsuya.settings_table import setting_rows
 
 
 @pytest.fixture(scope="module")
@@ -230,6 +234,132 @@ def test_the_gallery_writes_a_png_for_every_picture(
     }
     for path in (tmp_path / "photo_fur").iterdir():
         assert Image.open(path).size[0] >= 96
+
+
+def test_a_run_ends_with_the_pictures_of_what_was_asked(made: dict[str, Any], home: Path) -> None:
+    names = {Path(path).name for path in made["pictures"]}
+    assert {"fur_photo-grass-photograph.png", "fur_frames-square.grass-frames.png"} <= names
+    assert all(Path(path).parent == home / "pictures" / "photo_fur" for path in made["pictures"])
+    said = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square").stdout
+    assert all(name in said for name in names)
+
+
+def test_pictures_are_written_again_in_each_format(made: dict[str, Any], home: Path) -> None:
+    import av
+    import OpenEXR
+
+    folder = home / "pictures" / "photo_fur"
+    key = "photo_fur/fur_photo/grass"
+    assert "fur_photo-grass-photograph.png" in tsuya("pictures", key).stdout
+    written = tsuya("pictures", key, "--as", "exr").stdout.splitlines()
+    assert len(written) == 2
+    stored = open_dataset(Path(tsuya("path", key).stdout.strip()))["radiance"].values
+    with OpenEXR.File(str(folder / "fur_photo-grass-radiance.exr")) as file:
+        np.testing.assert_allclose(file.channels()["RGB"].pixels, stored, atol=1e-3)
+    key = "photo_fur/fur_frames/square.grass"
+    frames = open_dataset(Path(tsuya("path", key).stdout.strip()))["frames"].values
+    assert tsuya("pictures", key, "--as", "mp4").exit_code == 0
+    with av.open(str(folder / "fur_frames-square.grass-frames.mp4")) as film:
+        shown = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert len(shown) == len(frames)
+    off = np.abs(np.stack(shown).astype(int) - frames[:, : shown[0].shape[0], : shown[0].shape[1]])
+    assert off.mean() < 6  # colours at half the width: 4:2:0
+    assert tsuya("pictures", key, "--as", "webp").exit_code == 0
+    assert Image.open(folder / "fur_frames-square.grass-frames.webp").n_frames == len(frames)
+    still = tsuya("pictures", "photo_fur/attenuation/grass", "--as", "mp4")
+    assert still.exit_code == 2
+    assert "no moving pictures" in still.stderr
+
+
+def test_settings_are_explained(home: Path) -> None:
+    table = tsuya("settings", "photo_fur").stdout
+    for words in ("largest_side", "whole number, 64 to 8192", "1024", "Longer side in pixels"):
+        assert words in table
+    helped = " ".join(tsuya("run", "photo_fur", "--help").stdout.split())
+    assert "layers whole number, 1 to 250 Layers of shells, N (default 15)" in helped
+    assert tsuya("settings", "nothing").exit_code == 2
+
+
+@pytest.mark.parametrize("system", systems())
+def test_every_setting_has_a_meaning_and_a_kind(system: str) -> None:
+    for row in setting_rows(SYSTEMS[system]):
+        assert row.meaning, row
+        assert not re.search(r"typing|<class|Annotated|NoneType", row.values), row
+
+
+def test_the_shell_completes_systems_items_and_settings(home: Path) -> None:
+    def completed(words: str) -> set[str]:
+        environment = {
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split(" ")) - 1),
+            "_TSUYA_COMPLETE": "bash_complete",
+        }
+        result = CliRunner().invoke(main, env=environment, prog_name="tsuya")
+        return {line.partition(",")[2] for line in result.stdout.splitlines()}
+
+    assert "photo_fur" in completed("tsuya run ph")
+    assert {"sphere", "square"} <= completed("tsuya run photo_fur --mesh s")
+    assert "largest_side=" in completed("tsuya run photo_fur --set lar")
+    assert "complete -o nosort -F _tsuya_completion tsuya" in tsuya("completion", "bash").stdout
+
+
+def test_a_damaged_version_is_found_told_and_made_again(made: dict[str, Any], home: Path) -> None:
+    small = ("run", "photo_fur", "--photo", "grass", "--mesh", "square", "--preset", "test")
+    assert tsuya(*small).exit_code == 0
+    assert tsuya("verify").exit_code == 0
+    for key, part in (
+        ("photo_fur/fur_photo/grass", "radiance/c/0/0/0"),
+        ("photo_fur/attenuation/grass", "zarr.json"),
+        ("photo_fur/shell_mesh/square", "vertices/zarr.json"),
+    ):
+        folder = Path(tsuya("path", key).stdout.strip())
+        content = open_dataset(folder).attrs["tsuya"]["content"]
+        data = bytearray((folder / part).read_bytes())
+        data[len(data) // 2] ^= 4
+        (folder / part).write_bytes(data)
+        if part != "radiance/c/0/0/0":
+            assert "damaged" in tsuya("status").stdout or part != "zarr.json"
+            found = tsuya("verify", key)
+            assert found.exit_code == 1
+            assert part in found.stdout
+        # Whether it was looked for or not: the next launch makes it again.
+        result = tsuya(*small, *(("--force",) if part == "radiance/c/0/0/0" else ()))
+        assert result.exit_code == 0, result.output
+        again = Path(tsuya("path", key).stdout.strip())
+        assert again != folder
+        assert open_dataset(again).attrs["tsuya"]["content"] == content
+    assert tsuya("verify").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda home: home / "nowhere", "expected a folder"),
+        (lambda home: Path("dagster"), "expected an absolute path"),
+        (lambda home: _with(home, "dagster.yaml", b"concurrency: [unclosed"), "dagster.yaml"),
+        (lambda home: _with(home, "dagster.yaml", b"no_such_field: 1"), "dagster.yaml"),
+        (lambda home: _with(home, "history/runs.db", b"not a database " * 99), "history"),
+    ],
+    ids=["missing", "relative", "broken yaml", "unknown field", "broken history"],
+)
+def test_what_is_wrong_with_dagsters_home_is_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    damage: Callable[[Path], Path],
+    words: str,
+) -> None:
+    monkeypatch.setenv("DAGSTER_HOME", str(damage(tmp_path)))
+    monkeypatch.setenv("TSUYA_DATA", str(tmp_path / "data"))
+    result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square", "--preset", "test")
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def _with(home: Path, name: str, data: bytes) -> Path:
+    (home / name).parent.mkdir(parents=True, exist_ok=True)
+    (home / name).write_bytes(data)
+    return home
 
 
 def test_the_doctor_finds_this_machine_well_and_draws(
