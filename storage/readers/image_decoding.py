@@ -19,16 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
+from storage.readers.opening import check_memory, first_bytes
 
 if TYPE_CHECKING:
     import tifffile
     from PIL import Image, ImageFile
 
 LARGEST_MEGAPIXELS = 400
+LARGEST_PICTURE = 4 << 30
+"""Bytes of a file."""
 FORMATS = "a PNG, JPEG, TIFF or EXR photograph"
 
 _PNG_END = b"IEND\xaeB`\x82"  # the last chunk's name and checksum, the same in every PNG
 _SRGB_GAMMA = 0.45455
+_MEMORY_PER_BYTE = 500  # the best compressed photographs; what unfolds to more is no photograph
+_MOST_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
 _UPRIGHT: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     1: lambda a: a,
     2: lambda a: a[:, ::-1],
@@ -63,42 +68,35 @@ def decode_image(file: Path) -> DecodedImage:
     Raises BadInput where the file is missing, of another format, truncated, larger than
     400 megapixels or in a colour space or sample type that cannot be read faithfully.
     """
-    start = _first_bytes(file)
-    if start.startswith(b"\x89PNG\r\n\x1a\n"):
-        return _decode_png(file)
-    if start.startswith(b"\xff\xd8\xff"):
-        return _decode_jpeg(file)
-    if start[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return _decode_tiff(file)
-    if start.startswith(b"\x76\x2f\x31\x01"):
-        return _decode_exr(file)
+    start = first_bytes(file, 8, FORMATS, LARGEST_PICTURE)
+    for signatures, kind, decode in (
+        ((b"\x89PNG\r\n\x1a\n",), "PNG", _decode_png),
+        ((b"\xff\xd8\xff",), "JPEG", _decode_jpeg),
+        ((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "TIFF", _decode_tiff),
+        ((b"\x76\x2f\x31\x01",), "EXR", _decode_exr),
+    ):
+        if start.startswith(signatures):
+            try:
+                return decode(file)
+            except BadInput:
+                raise
+            except Exception as error:  # decoders of damaged data raise nearly anything
+                raise _damaged(file, kind) from error
     raise BadInput(file, "format", "unknown" if start else "unknown (the file is empty)", FORMATS)
-
-
-def _first_bytes(file: Path) -> bytes:
-    if file.is_dir():
-        raise BadInput(file, "file", "a directory", FORMATS)
-    try:
-        with file.open("rb") as stream:
-            return stream.read(8)
-    except FileNotFoundError:
-        raise BadInput(file, "file", "missing", FORMATS) from None
-    except OSError as error:
-        raise BadInput(file, "file", f"unreadable ({error.strerror})", FORMATS) from error
 
 
 def _damaged(file: Path, kind: str) -> BadInput:
     return BadInput(file, "content", "truncated or damaged", f"a complete {kind} file")
 
 
-def _check_area(file: Path, width: int, height: int) -> None:
+def _check_area(file: Path, width: int, height: int, pixel_bytes: int) -> None:
+    """``pixel_bytes``: of one pixel with all its channels, as it is decoded."""
+    found = f"{width} x {height} pixels"
     if width * height > LARGEST_MEGAPIXELS * 1_000_000:
-        raise BadInput(
-            file,
-            "size",
-            f"{width} x {height} pixels",
-            f"at most {LARGEST_MEGAPIXELS} megapixels",
-        )
+        raise BadInput(file, "size", found, f"at most {LARGEST_MEGAPIXELS} megapixels")
+    # Decoded, turned about and converted, then three floats and what is asked of each.
+    needed = width * height * (3 * pixel_bytes + 20)
+    check_memory(file, "size", found, needed, file.stat().st_size, _MEMORY_PER_BYTE)
 
 
 # --- PNG and JPEG -------------------------------------------------------------------------------
@@ -108,41 +106,43 @@ def _decode_png(file: Path) -> DecodedImage:
     from PIL import PngImagePlugin
 
     data = file.read_bytes()
-    image = _load_with_pillow(file, "PNG", PngImagePlugin.PngImageFile, io.BytesIO(data))
+    deep = data[24] == 16  # the header chunk's bit depth
+    image = _load_with_pillow(file, PngImagePlugin.PngImageFile, io.BytesIO(data), 8 if deep else 4)
     if _PNG_END not in data[-4096:] and _PNG_END not in data:
         raise _damaged(file, "PNG")
     _check_png_gamma(file, image)
-    deep = data[24] == 16  # the header chunk's bit depth
     decoded = _deep_png(file, data, image) if deep else _eight_bits(file, image)
-    return _turned_upright(decoded, image)
+    return _turned_upright(file, decoded, image)
 
 
 def _decode_jpeg(file: Path) -> DecodedImage:
     from PIL import JpegImagePlugin
 
-    with file.open("rb") as stream:
-        image = _load_with_pillow(file, "JPEG", JpegImagePlugin.JpegImageFile, stream)
-        return _turned_upright(_eight_bits(file, image), image)
+    data = file.read_bytes()
+    scans = data.count(b"\xff\xda")
+    if scans > _MOST_SCANS:
+        raise BadInput(file, "number of scans", f"{scans}", f"at most {_MOST_SCANS}")
+    image = _load_with_pillow(file, JpegImagePlugin.JpegImageFile, io.BytesIO(data), 4)
+    return _turned_upright(file, _eight_bits(file, image), image)
 
 
 def _load_with_pillow(
-    file: Path, kind: str, plugin: type[ImageFile.ImageFile], stream: Any
+    file: Path, plugin: type[ImageFile.ImageFile], stream: Any, pixel_bytes: int
 ) -> ImageFile.ImageFile:
     """Open through the format's own class: ``Image.open`` would apply a limit of its own, which
     can only be changed for the whole process."""
-    try:
-        image = plugin(stream)
-        _check_area(file, *image.size)
-        image.load()
-    except BadInput:
-        raise
-    except Exception as error:  # decoders of damaged data raise nearly anything
-        raise _damaged(file, kind) from error
+    image = plugin(stream)
+    _check_area(file, *image.size, pixel_bytes)
+    image.load()
     return image
 
 
-def _turned_upright(decoded: DecodedImage, image: Image.Image) -> DecodedImage:
-    turn = _UPRIGHT.get(image.getexif().get(0x0112, 1), _UPRIGHT[1])
+def _turned_upright(file: Path, decoded: DecodedImage, image: Image.Image) -> DecodedImage:
+    try:
+        orientation = image.getexif().get(0x0112, 1)
+    except Exception as error:  # SyntaxError, struct.error and others by what is broken
+        raise BadInput(file, "EXIF block", "damaged", "a readable one or none") from error
+    turn = _UPRIGHT.get(orientation, _UPRIGHT[1]) if isinstance(orientation, int) else _UPRIGHT[1]
     opaque = None if decoded.opaque is None else turn(decoded.opaque)
     return DecodedImage(turn(decoded.colours), opaque)
 
@@ -191,18 +191,17 @@ def _decode_tiff(file: Path) -> DecodedImage:
     import tifffile
     from PIL import TiffImagePlugin
 
-    try:
-        with tifffile.TiffFile(file) as tiff:
-            page = tiff.pages.first
-            width, height = int(page.imagewidth), int(page.imagelength)
-            ends = [a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=True)]
-            complete = max(ends) <= file.stat().st_size
-            complete &= len(page.tags) == _tag_count(tiff, page)
-    except Exception as error:  # decoders of damaged data raise nearly anything
-        raise _damaged(file, "TIFF") from error
+    with tifffile.TiffFile(file) as tiff:
+        page = tiff.pages.first
+        ends = [a + b for a, b in zip(page.dataoffsets, page.databytecounts, strict=True)]
+        complete = max(ends) <= file.stat().st_size
+        complete &= len(page.tags) == _tag_count(tiff, page)
     if not complete:
         raise _damaged(file, "TIFF")
-    _check_area(file, width, height)
+    pixel_bytes = (page.dtype.itemsize if page.dtype else 1) * max(page.samplesperpixel, 4)
+    _check_area(file, int(page.imagewidth), int(page.imagelength), pixel_bytes)
+    if page.is_tiled:
+        _check_area(file, int(page.tilewidth), int(page.tilelength), pixel_bytes)
     kind = str(np.dtype(page.dtype)) if page.dtype else f"{page.bitspersample} bit"
     if kind in ("uint16", "float32", "float64"):
         return _deep_tiff(file, page, np.dtype(kind))
@@ -212,9 +211,7 @@ def _decode_tiff(file: Path) -> DecodedImage:
         )
     with file.open("rb") as stream:
         # Pillow turns TIFF files upright by itself, unlike the other formats.
-        return _eight_bits(
-            file, _load_with_pillow(file, "TIFF", TiffImagePlugin.TiffImageFile, stream)
-        )
+        return _eight_bits(file, _load_with_pillow(file, TiffImagePlugin.TiffImageFile, stream, 4))
 
 
 def _tag_count(tiff: tifffile.TiffFile, page: tifffile.TiffPage) -> int:
@@ -257,10 +254,7 @@ def _decode_with_opencv(
     """(height, width, channels), RGB(A) order, as stored."""
     import cv2
 
-    try:
-        values = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise _damaged(file, kind) from error
+    values = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     if values is None or values.dtype != sample_type:
         raise _damaged(file, kind)
     if values.ndim == 2:
@@ -274,18 +268,14 @@ def _decode_with_opencv(
 def _decode_exr(file: Path) -> DecodedImage:
     import OpenEXR
 
-    try:
-        with OpenEXR.File(str(file), header_only=True) as header_file:
-            part = header_file.parts[0]
-            # Copied: closing the file empties the header.
-            primaries = part.header.get("chromaticities")
-            _check_area(file, part.width(), part.height())
-        with OpenEXR.File(str(file), separate_channels=True) as exr:
-            channels = {name: channel.pixels for name, channel in exr.channels().items()}
-    except BadInput:
-        raise
-    except Exception as error:  # RuntimeError, ValueError and others by what is broken
-        raise _damaged(file, "EXR") from error
+    with OpenEXR.File(str(file), header_only=True) as header_file:
+        part = header_file.parts[0]
+        # Copied: closing the file empties the header.
+        primaries = part.header.get("chromaticities")
+        for every in header_file.parts:  # all are decoded
+            _check_area(file, every.width(), every.height(), 4 * len(every.channels))
+    with OpenEXR.File(str(file), separate_channels=True) as exr:
+        channels = {name: channel.pixels for name, channel in exr.channels().items()}
     _check_primaries(file, primaries)
     names = _colour_channels(file, channels)
     colours = np.stack([channels[name] for name in names], axis=-1)

@@ -6,6 +6,7 @@ Blender writes, and accepts ASCII files that end early (both seen).
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
+from storage.readers.opening import number, whole_file
 from storage.readers.polygons import PolygonMesh
 
 _TYPES = {
@@ -57,7 +59,7 @@ def read_ply(file: Path) -> PolygonMesh:
 
     Raises BadInput for a header that cannot be understood, and for a file that ends early.
     """
-    data = file.read_bytes()
+    data = whole_file(file, "a PLY mesh")
     header, order, start = _header(file, data)
     try:
         body = _AsciiBody(data, start) if not order else _BinaryBody(data, start)
@@ -84,8 +86,12 @@ def _polygon_mesh(
     polygons = face.get("vertex_indices", face.get("vertex_index"))
     if not isinstance(polygons, _Lists):
         polygons = _Lists(np.zeros(0, np.int64), np.zeros(0))
-    with np.errstate(invalid="ignore"):  # a reference that is no number is refused later
-        corners = polygons.values.astype(np.int64)
+    if (wrong := ~(np.abs(polygons.values) < 2**53) | (polygons.values % 1 != 0)).any():
+        corner = int(np.argmax(wrong))
+        polygon = int(np.searchsorted(np.cumsum(polygons.lengths), corner, side="right"))
+        found = f"a reference to vertex {polygons.values[corner]:g}"
+        raise BadInput(file, f"face {polygon}", found, "whole numbers")
+    corners = polygons.values.astype(np.int64)
     uvs = None
     wedges = face.get("texcoord")
     names = next((pair for pair in _UV_NAMES if set(pair) <= vertex.keys()), None)
@@ -135,7 +141,10 @@ class _AsciiBody:
     """Rows of numbers in text; line ends do not matter."""
 
     def __init__(self, data: bytes, start: int) -> None:
-        self._numbers = np.array(data[start:].split()).astype(np.float64)
+        # Line by line: an array of words has room for the longest in each of its places.
+        lines = io.BytesIO(data[start:])
+        words = (word for line in lines for word in line.split())
+        self._numbers = np.fromiter(map(number, words), np.float64)
         self.at = 0
 
     def take(self, type_: np.dtype[Any], count: int) -> NDArray[np.float64]:
@@ -186,6 +195,14 @@ def _read_element(
         return _ragged_rows(body, element)
 
 
+def _length(body: _AsciiBody | _BinaryBody, type_: np.dtype[Any]) -> int:
+    """Of a list; raises ValueError where it is no whole number."""
+    length = float(body.take(type_, 1)[0])
+    if not length.is_integer():  # nor infinite, nor no number
+        raise ValueError("a length that is no whole number")
+    return int(length)
+
+
 def _alike_rows(
     body: _AsciiBody | _BinaryBody, element: _Element
 ) -> dict[str, NDArray[np.float64] | _Lists]:
@@ -197,7 +214,7 @@ def _alike_rows(
     lengths = {}
     for item in element.properties:
         if item.count_type is not None:
-            lengths[item.name] = int(body.take(item.count_type, 1)[0])
+            lengths[item.name] = _length(body, item.count_type)
         body.take(item.type, lengths.get(item.name, 1))
     body.at = start
     fields = []
@@ -211,10 +228,12 @@ def _alike_rows(
         if item.count_type is None:
             result[item.name] = next(columns)[:, 0].astype(np.float64)
             continue
-        counts = next(columns)[:, 0].astype(np.int64)
+        counts = next(columns)[:, 0]
         if (counts != lengths[item.name]).any():
             raise _EndOfFileError
-        result[item.name] = _Lists(counts, next(columns).astype(np.float64).ravel())
+        result[item.name] = _Lists(
+            counts.astype(np.int64), next(columns).astype(np.float64).ravel()
+        )
     return result
 
 
@@ -225,7 +244,7 @@ def _ragged_rows(
     taken: list[list[NDArray[np.float64]]] = [[] for _ in element.properties]
     for _ in range(element.rows):
         for item, values in zip(element.properties, taken, strict=True):
-            count = 1 if item.count_type is None else int(body.take(item.count_type, 1)[0])
+            count = 1 if item.count_type is None else _length(body, item.count_type)
             values.append(body.take(item.type, count))
     result: dict[str, NDArray[np.float64] | _Lists] = {}
     for item, values in zip(element.properties, taken, strict=True):

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.meshes import GlbFile, check_polygons, mesh_format, read_glb, split_by_uv
+from storage.readers.glb_files import GlbFile, read_glb
+from storage.readers.meshes import check_polygons, mesh_format, split_by_uv
 from storage.readers.obj_files import ObjFile, read_obj
 from storage.readers.ply_files import read_ply
 from storage.readers.polygons import PolygonMesh, triangulate
