@@ -185,9 +185,11 @@ class _Look:
 
     def _is_gone(self, dimension: Dimension, key: str) -> bool:
         """Whether a partition that has no usable item is to go."""
+        if dimension.needs_no_file(key):
+            return False
         store = self.workspace.store
-        stored = self.system.slots_of(dimension.name, key, store)
-        return not dimension.needs_no_file(key) and not any(map(store.versions, stored))
+        stored = (s for s in store.slots() if self.system.is_made_of(s, dimension.name, key))
+        return not any(map(store.versions, stored))
 
     def _remember(self, registered: set[str]) -> None:
         """What is away for now, or on its way, and has a partition: another item that comes under

@@ -215,16 +215,13 @@ class System:
                     found.append(keys)
         return found
 
-    def slots_of(self, dimension: str, key: str, store: VersionedStore) -> list[Slot]:
-        """Where something is stored that was made of one item, of it alone or with others."""
-        found = []
-        for slot in store.slots():
-            plan = self.plans.get(slot.asset) if slot.system == self.name else None
-            if plan is not None and dimension in plan.by:
-                keys = keys_of_partition(slot.partition, plan.by, separator=".")
-                if keys[dimension] == key:
-                    found.append(slot)
-        return found
+    def is_made_of(self, slot: Slot, dimension: str, key: str) -> bool:
+        """Whether what is stored there is made of one item, of it alone or with others."""
+        plan = self.plans.get(slot.asset) if slot.system == self.name else None
+        if plan is None or dimension not in plan.by:
+            return False
+        keys = slot.partition.split(".")
+        return len(keys) == len(plan.by) and keys[sorted(plan.by).index(dimension)] == key
 
     def examples(self) -> list[dict[str, str]]:
         """The partitions that the demo shows."""

@@ -139,4 +139,7 @@ def _sweep(inbox: Path) -> None:
     """Delete what killed processes left behind."""
     for left in inbox.glob(".*.part"):
         if time.time() - left.lstat().st_mtime > _LEFT_BEHIND_SECONDS:
-            shutil.rmtree(left, ignore_errors=True)
+            if left.is_dir() and not left.is_symlink():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)

@@ -120,6 +120,17 @@ def rollback(key: str) -> None:
 
 @main.command()
 @click.argument("key")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+@says_errors
+def remove(key: str, yes: bool) -> None:
+    """Remove KEY, an item like photo_fur/fox-jpg: its file, all that was made of it."""
+    from tsuya.remove import remove as remove_item
+
+    remove_item(key, ask=not yes)
+
+
+@main.command()
+@click.argument("key")
 @click.option(
     "--as",
     "ending",
