@@ -21,14 +21,27 @@ DAGSTER_HOME=$root/.dagster
 TSUYA_DATA=$root/data
 ENV
 cat > .dagster/dagster.yaml <<'YAML'
-# One run at a time: a run uses all cores of a small machine by itself.
+# One run of the queue at a time: a run uses all cores of a small machine by itself. What the
+# command line runs has no code location: it is beside the queue, and the queue never waits for it.
 concurrency:
   runs:
-    max_concurrent_runs: 1
+    max_concurrent_runs: -1
+    tag_concurrency_limits:
+      - key: dagster/code_location
+        limit: 1
   pools:
     default_limit: 1
 run_monitoring:
   enabled: true
+# Ticks are what the schedule and the sensors have noted; days.
+retention:
+  schedule:
+    purge_after_days: 90
+  sensor:
+    purge_after_days:
+      skipped: 1
+      failure: 30
+      success: 30
 telemetry:
   enabled: false
 nux:
