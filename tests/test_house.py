@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 
@@ -98,3 +99,10 @@ def test_what_needs_no_dagster_imports_none(statement: str) -> None:
     code = f"{statement}\nimport sys; print('dagster' in sys.modules, 'torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
+
+
+def test_tests_of_one_system_run_in_one_process(request: pytest.FixtureRequest) -> None:
+    """Else each process compiles and materialises everything again: five minutes of CPU."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        pytest.skip("the tests run in one process anyway")
+    assert request.node.nodeid.rpartition("@")[2] == __file__
