@@ -14,6 +14,7 @@ from storage.readers.bad_input import BadInput
 from storage.readers.btf_measured import MeasuredBTF
 from storage.readers.btf_photographs import open_photographs
 from storage.readers.btf_ubo2014 import open_ubo2014
+from storage.readers.opening import first_bytes
 
 __all__ = ["MeasuredBTF", "open_btf"]
 
@@ -42,15 +43,9 @@ def open_btf(
     file = Path(os.path.abspath(path))
     if file.is_dir():
         return open_photographs(file, crop)
-    try:
-        with file.open("rb") as stream:
-            start = stream.read(4)
-        if start.startswith(b"!"):
-            return open_ubo2014(file, crop)
-    except FileNotFoundError:
-        raise BadInput(file, "file", "missing", _EXPECTED) from None
-    except OSError as error:
-        raise BadInput(file, "file", f"unreadable ({error.strerror})", _EXPECTED) from error
+    start = first_bytes(file, 4, _EXPECTED, largest=None)
+    if start.startswith(b"!"):
+        return open_ubo2014(file, crop)
     if start in (b"PK\3\4", b"PK\5\6"):  # a member, or the directory of an empty zip
         return open_photographs(file, crop)
     raise BadInput(file, "format", "unknown" if start else "unknown (the file is empty)", _EXPECTED)

@@ -16,10 +16,12 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from storage.readers.bad_input import BadInput
+from storage.readers.opening import check_file, first_bytes
 
 LARGEST_MEMBER = 64_000_000
 """Bytes of one photograph's file; a member that unpacks to more is no photograph."""
 
+_PHOTOGRAPH = "a BTF photograph"
 _LOCAL_HEADER = struct.Struct("<4s22xHH")  # signature, lengths of the name and of the extra field
 _STORED, _DEFLATED = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
 
@@ -180,28 +182,16 @@ class FolderMembers:
 
     def size(self, name: str) -> int:
         """Bytes of a file."""
-        try:
-            return (self.path / name).stat().st_size
-        except OSError as error:
-            raise self._unreadable(name, error) from error
+        return check_file(self.path / name, _PHOTOGRAPH, largest=None)
 
     def start(self, name: str, count: int) -> bytes:
         """A file's first ``count`` bytes."""
-        try:
-            with (self.path / name).open("rb") as stream:
-                return stream.read(count)
-        except OSError as error:
-            raise self._unreadable(name, error) from error
+        return first_bytes(self.path / name, count, _PHOTOGRAPH, largest=None)
 
     def whole(self, name: str) -> bytes:
         """A file's content."""
         _check_size(self.path / name, self.size(name))
         return self.start(name, LARGEST_MEMBER)
-
-    def _unreadable(self, name: str, error: OSError) -> BadInput:
-        return BadInput(
-            self.path / name, "file", f"unreadable ({error.strerror})", "a BTF photograph"
-        )
 
 
 def _check_size(file: Path, size: int) -> None:

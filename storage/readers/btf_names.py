@@ -110,7 +110,10 @@ def ordered_photographs(path: Path, names: Iterable[str]) -> NamedPhotographs:
         pair = (angles.view, angles.light)
         if pair in found:
             raise BadInput(
-                path, f"photograph {_pair(pair)}", f"in two files ({found[pair]} and {name})", "one"
+                path / name,
+                f"photograph {_pair(pair)}",
+                f"in two files (also {found[pair]})",
+                "one",
             )
         found[pair] = name
     if not found:

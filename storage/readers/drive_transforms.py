@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.bad_input import BadInput
+from storage.readers.bad_input import BadInput, shortened
+from storage.readers.opening import DEEPEST_JSON, LARGEST_JSON, parsed_json, whole_file
 
 TRANSFORMS = "transforms.json"
 
@@ -26,6 +27,9 @@ _EXPECTED = "a folder with transforms.json, as nerfstudio and instant-ngp have i
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "OPENCV", "SIMPLE_RADIAL", "RADIAL")
 _FARTHEST = 1e8  # metres: more than any coordinate on earth, in whatever grid
 _ROTATION_TOLERANCE = 1e-3
+_LARGEST_NUMBER = 1e15  # of a camera
+_FOCAL_RANGE = 1e4  # of the width: from beyond any pinhole to beyond any telescope
+_LARGEST_COEFFICIENT = 1e9  # of the distortion; a long lens has large ones of high powers
 
 _Layers = Sequence[tuple[str, dict[str, Any]]]
 
@@ -94,17 +98,18 @@ def shown_number(value: float) -> str:
 def _json(folder: Path, file: Path) -> Any:
     if not folder.is_dir():
         raise BadInput(folder, "drive", "a file" if folder.exists() else "missing", _EXPECTED)
+    if not file.exists():
+        raise BadInput(folder, "drive", f"without {TRANSFORMS}", _EXPECTED)
     try:
-        return json.loads(file.read_bytes())  # UTF-8, -16 and -32, with a byte order mark or not
-    except FileNotFoundError:
-        raise BadInput(folder, "drive", f"without {TRANSFORMS}", _EXPECTED) from None
-    except OSError as error:
-        raise BadInput(file, "file", f"unreadable ({error.strerror})", _EXPECTED) from error
+        return parsed_json(whole_file(file, _EXPECTED, LARGEST_JSON))
     except json.JSONDecodeError as error:
         found = f"broken in line {error.lineno}, column {error.colno}"
         raise BadInput(file, "JSON", found, "a complete JSON object") from error
-    except (ValueError, RecursionError) as error:  # no text, numbers of 5000 digits
-        raise BadInput(file, "JSON", "broken", "a complete JSON object") from error
+    except BadInput:
+        raise
+    except ValueError as error:  # no text, numbers of 5000 digits, nested too deep
+        expected = f"a complete JSON object, nested {DEEPEST_JSON} deep at most"
+        raise BadInput(file, "JSON", "broken", expected) from error
 
 
 def _frame(file: Path, row: int, entry: Any, cameras: dict[str, Any], top: dict[str, Any]) -> Frame:
@@ -123,7 +128,8 @@ def _camera(file: Path, own: _Layers) -> str:
     value = _required(file, own, "camera", "a name or a number")
     if isinstance(value, str) and value.strip():
         return value.strip()
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if is_number and abs(value) <= _LARGEST_NUMBER:  # not NaN, infinite or of 400 digits
         return str(int(value)) if value == int(value) else str(value)
     raise BadInput(file, f"{own[0][0]}camera", _shown(value), "a name or a number")
 
@@ -188,7 +194,7 @@ def _lens(file: Path, camera: str, layers: _Layers) -> Lens:
                 file,
                 key,
                 f"missing for camera {camera}",
-                f"a number in the frame, in cameras.{camera} or at the top",
+                f"a number in the frame, in cameras.{shortened(camera, 40)} or at the top",
             )
         return where + key, _number(file, where + key, value)
 
@@ -203,6 +209,10 @@ def _lens(file: Path, camera: str, layers: _Layers) -> Lens:
         field, values[key] = found(key)
         if values[key] <= 0:
             raise BadInput(file, field, shown_number(values[key]), "more than 0 pixels")
+        least, most = values["w"] / _FOCAL_RANGE, values["w"] * _FOCAL_RANGE
+        if not least <= values[key] <= most:
+            expected = f"{least:g} to {most:g} pixels, for a picture {values['w']} wide"
+            raise BadInput(file, field, shown_number(values[key]), expected)
     for key, side_of in (("cx", "w"), ("cy", "h")):
         field, values[key] = found(key)
         if not 0 < values[key] < values[side_of]:
@@ -211,6 +221,9 @@ def _lens(file: Path, camera: str, layers: _Layers) -> Lens:
     for key in ("k1", "k2", "p1", "p2", "k3"):
         where, value = _nearest(layers, key)
         values[key] = 0.0 if where is None else _number(file, where + key, value)
+        if abs(values[key]) > _LARGEST_COEFFICIENT:
+            expected = f"a coefficient of at most {_LARGEST_COEFFICIENT:g}"
+            raise BadInput(file, f"{where}{key}", shown_number(values[key]), expected)
     return Lens(**values)  # type: ignore[arg-type]  # w and h are integers, see above
 
 
@@ -257,5 +270,4 @@ def _number(file: Path, field: str, value: Any) -> float:
 
 def _shown(value: Any) -> str:
     """A value as JSON, not too long."""
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 60 else text[:60] + "…"
+    return shortened(json.dumps(value, ensure_ascii=False))

@@ -17,9 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.bad_input import BadInput
+from storage.readers.bad_input import BadInput, shortened
 from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown_number
-from storage.readers.image_decoding import decode_image
+from storage.readers.image_decoding import LARGEST_PICTURE, decode_image
+from storage.readers.opening import first_bytes
 
 FEWEST_CAMERAS = 2
 FEWEST_INSTANTS = 3
@@ -148,7 +149,7 @@ def _instants(file: Path, frames: Sequence[Frame]) -> list[dict[str, Frame]]:
 
 def _listed(names: set[str] | dict[str, Frame]) -> str:
     more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-    return ", ".join(sorted(names)[:8]) + more
+    return shortened(", ".join(sorted(names)[:8])) + more
 
 
 def _lens(file: Path, name: str, instants: Sequence[dict[str, Frame]]) -> Lens:
@@ -175,7 +176,7 @@ def _check_sizes(file: Path, names: Sequence[str], lenses: dict[str, Lens]) -> N
                 file,
                 f"picture size of camera {name}",
                 f"{lens.w} x {lens.h} pixels",
-                f"{first.w} x {first.h} pixels as of camera {names[0]}",
+                f"{first.w} x {first.h} pixels as of camera {shortened(names[0], 40)}",
             )
 
 
@@ -233,9 +234,8 @@ def _check_header(file: Path, width: int, height: int) -> None:
     from PIL import JpegImagePlugin, PngImagePlugin
 
     try:
+        start = first_bytes(file, 8, _PHOTOGRAPH, LARGEST_PICTURE, field="photograph")
         with file.open("rb") as stream:
-            start = stream.read(8)
-            stream.seek(0)
             image: PngImagePlugin.PngImageFile | JpegImagePlugin.JpegImageFile
             if start.startswith(b"\x89PNG\r\n\x1a\n"):
                 image = PngImagePlugin.PngImageFile(stream)
@@ -248,8 +248,6 @@ def _check_header(file: Path, width: int, height: int) -> None:
             orientation = tags.get(0x0112, 1)
     except BadInput:
         raise
-    except FileNotFoundError:
-        raise BadInput(file, "photograph", "missing", _PHOTOGRAPH) from None
     except Exception as error:  # decoders of damaged data raise nearly anything
         if isinstance(error, OSError) and error.strerror:  # the system's, not Pillow's
             raise BadInput(file, "file", f"unreadable ({error.strerror})", _PHOTOGRAPH) from error

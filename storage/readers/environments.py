@@ -13,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.btf_radiance import SIGNATURE, radiance_header, radiance_pixels
-from storage.readers.image_decoding import decode_image
+from storage.readers.btf_radiance import (
+    SIGNATURE,
+    RadianceHeader,
+    radiance_header,
+    radiance_pixels,
+)
+from storage.readers.image_decoding import LARGEST_PICTURE, decode_image
+from storage.readers.opening import check_memory, first_bytes
 
 SMALLEST_WIDTH = 16
 LARGEST_WIDTH = 16384
@@ -28,6 +34,8 @@ _OTHER_SIGNATURES = {
     b"MM\0*": "TIFF",
 }
 _LONGEST_HEADER = 1_000_000  # bytes of a Radiance header; the usual ones have some hundred
+_LONGEST_RUN = 127  # of a Radiance picture
+_PIXEL_BYTES, _MEMORY_PER_BYTE = 40, 500
 _CHANNELS = {1: ("grey",), 3: ("red", "green", "blue")}
 
 
@@ -50,7 +58,7 @@ def read_environment(path: str | PathLike[str]) -> NDArray[np.float32]:
     row, from 0 at the top left) and a picture that is all black.
     """
     file = Path(path)
-    start = _first_bytes(file)
+    start = first_bytes(file, _LONGEST_HEADER, _EXPECTED, LARGEST_PICTURE)
     if start.startswith(SIGNATURE):
         light = _radiance_picture(file, start)
     elif start.startswith(_EXR_SIGNATURE):
@@ -61,18 +69,6 @@ def read_environment(path: str | PathLike[str]) -> NDArray[np.float32]:
     if light.shape[2] == 1:
         light = np.repeat(light, 3, axis=2)
     return np.ascontiguousarray(light)
-
-
-def _first_bytes(file: Path) -> bytes:
-    if file.is_dir():
-        raise BadInput(file, "file", "a directory", _EXPECTED)
-    try:
-        with file.open("rb") as stream:
-            return stream.read(_LONGEST_HEADER)
-    except FileNotFoundError:
-        raise BadInput(file, "file", "missing", _EXPECTED) from None
-    except OSError as error:
-        raise BadInput(file, "file", f"unreadable ({error.strerror})", _EXPECTED) from error
 
 
 def _no_radiance(file: Path, start: bytes) -> BadInput:
@@ -89,6 +85,7 @@ def _radiance_picture(file: Path, start: bytes) -> NDArray[np.float32]:
     except IndexError:
         raise _damaged(file, "Radiance") from None
     _check_size(file, header.width, header.height)
+    _check_memory(file, header)
     return radiance_pixels(file, file.read_bytes())
 
 
@@ -129,6 +126,15 @@ def _check_size(file: Path, width: int, height: int) -> None:
     if width > LARGEST_WIDTH:
         largest = f"at most {LARGEST_WIDTH} x {LARGEST_WIDTH // 2} pixels"
         raise BadInput(file, "size", found, largest)
+
+
+def _check_memory(file: Path, header: RadianceHeader) -> None:
+    pixels = header.width * header.height
+    stored = file.stat().st_size - header.pixels_at
+    if _LONGEST_RUN * stored < 2 * 4 * pixels:  # two bytes a run of one of four channels
+        raise _damaged(file, "Radiance")
+    found = f"{header.width} x {header.height} pixels"
+    check_memory(file, "size", found, _PIXEL_BYTES * pixels, stored, _MEMORY_PER_BYTE)
 
 
 def _check_radiance(file: Path, light: NDArray[np.float32]) -> None:

@@ -60,10 +60,14 @@ def check_file(
 
 
 def first_bytes(
-    path: str | PathLike[str], count: int, expected: str, largest: int | None = LARGEST_FILE
+    path: str | PathLike[str],
+    count: int,
+    expected: str,
+    largest: int | None = LARGEST_FILE,
+    field: str = "file",
 ) -> bytes:
     """How a file begins; raises BadInput as :func:`check_file`."""
-    check_file(path, expected, largest)
+    check_file(path, expected, largest, field)
     try:
         with open(path, "rb") as stream:
             return stream.read(count)

@@ -17,9 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
+from storage.readers.opening import LONGEST_NUMBER, check_file, unreadable
 
 FEWEST_POINTS = 3
 MOST_POINTS = 100_000
+
+_LARGEST = 64 << 20  # bytes: 600 a point
 
 _EXPECTED = "a CSV file of points v, n in UTF-8"
 _SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
@@ -119,8 +122,7 @@ def _rows(file: Path) -> Iterator[tuple[int, float, float]]:
 
 def _lines(file: Path) -> Iterator[tuple[int, str]]:
     """The lines that are not blank, with their numbers from 1; a byte order mark is left out."""
-    if file.is_dir():
-        raise BadInput(file, "file", "a directory", _EXPECTED)
+    check_file(file, _EXPECTED, _LARGEST)
     empty = True
     try:
         with file.open(encoding="utf-8-sig") as stream:
@@ -130,12 +132,10 @@ def _lines(file: Path) -> Iterator[tuple[int, str]]:
                 if line.strip():
                     empty = False
                     yield number, line
-    except FileNotFoundError:
-        raise BadInput(file, "file", "missing", _EXPECTED) from None
     except UnicodeDecodeError:
         raise BadInput(file, "content", "not UTF-8 text", _EXPECTED) from None
     except OSError as error:
-        raise BadInput(file, "file", f"unreadable ({error.strerror})", _EXPECTED) from error
+        raise unreadable(file, error, _EXPECTED) from error
     if empty:
         raise BadInput(file, "content", "empty", _EXPECTED)
 
@@ -176,10 +176,12 @@ def _named(file: Path, cells: list[str]) -> _Layout | None:
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        float(word[:LONGEST_NUMBER])
     except ValueError:
         return False
-    return "_" not in word  # 1_000 is Python's way to write a thousand, nobody else's
+    return (
+        len(word) <= LONGEST_NUMBER and "_" not in word
+    )  # 1_000 is Python's way to write a thousand, nobody else's
 
 
 def _finite(file: Path, number: int, name: str, cell: str) -> float:

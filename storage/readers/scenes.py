@@ -16,12 +16,14 @@ from storage.readers.bad_input import BadInput
 from storage.readers.glb_files import GlbFile, read_glb
 from storage.readers.meshes import check_polygons, mesh_format, split_by_uv
 from storage.readers.obj_files import ObjFile, read_obj
+from storage.readers.opening import number, whole_file
 from storage.readers.ply_files import read_ply
 from storage.readers.polygons import PolygonMesh, triangulate
 
 LEAST_ROUGHNESS = 1e-3
 """Mirrors, whose slope would be 0, are read as this rough."""
 
+_LARGEST_LIBRARY = 16 << 20  # bytes
 _DIELECTRIC = 0.04  # Fresnel reflectance at normal incidence that glTF 2.0 gives what is no metal
 
 
@@ -248,15 +250,11 @@ def _library(file: Path, name: str) -> Path | None:
 
 def _read_library(file: Path) -> dict[str, Material]:
     """The materials of an MTL file by name; raises BadInput naming the line that is wrong."""
-    try:
-        text = file.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        found = f"unreadable ({error.strerror})"
-        raise BadInput(file, "file", found, "a material library") from error
+    text = whole_file(file, "a material library", _LARGEST_LIBRARY).decode("utf-8-sig", "replace")
     materials: dict[str, Material] = {}
     name: str | None = None
     with_roughness: set[str] = set()
-    for number, line in enumerate(text.splitlines(), start=1):
+    for row, line in enumerate(text.splitlines(), start=1):
         keyword, *words = line.split("#", 1)[0].split() or [""]
         if keyword == "newmtl":
             name = " ".join(line.split()[1:])
@@ -270,7 +268,7 @@ def _read_library(file: Path) -> dict[str, Material]:
             materials[name] = _with(materials[name], keyword, words, name in with_roughness)
         except ValueError as error:
             shown = line.strip()[:60]
-            raise BadInput(file, f"line {number}", f"'{shown}'", str(error)) from None
+            raise BadInput(file, f"line {row}", f"'{shown}'", str(error)) from None
         if keyword == "Pr":
             with_roughness.add(name)
     return materials
@@ -294,7 +292,7 @@ def _with(material: Material, keyword: str, words: list[str], has_roughness: boo
 
 def _numbers(words: list[str], counts: tuple[int, ...], most: float, expected: str) -> list[float]:
     try:
-        numbers = [float(word) for word in words]
+        numbers = [number(word) for word in words]
     except ValueError:
         numbers = []
     within = all(math.isfinite(value) and 0 <= value <= most for value in numbers)

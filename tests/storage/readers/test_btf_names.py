@@ -133,7 +133,7 @@ def test_two_files_of_a_pair_are_both_named() -> None:
     text = str(refusal(names))
     assert "photograph tl=0 pl=0 tv=0 pv=0 is in two files" in text
     assert names[0] in text
-    assert names[1] in text
+    assert text.startswith(names[1].rsplit("/")[-1])
 
 
 @pytest.mark.parametrize(

@@ -250,7 +250,7 @@ def test_a_block_reads_its_own_files_only(tmp_path: Path) -> None:
     assert btf.read(2, 2).shape == (0, HEIGHT, WIDTH, 3)
     text = refusal(lambda: btf.read(3, 6), os.path.basename(names[4]))
     assert "content is truncated or damaged; expected a complete PNG file" in text
-    assert "file is unreadable" in refusal(lambda: btf.read(0, 1), os.path.basename(names[0]))
+    assert "file is missing" in refusal(lambda: btf.read(0, 1), os.path.basename(names[0]))
 
 
 def test_photographs_that_do_not_exist(tmp_path: Path) -> None:

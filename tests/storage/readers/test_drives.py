@@ -313,7 +313,7 @@ def test_no_drive(tmp_path: Path) -> None:
     text = refusal(lambda: read_drive(folder), "street")
     assert "without transforms.json" in text
     (folder / "transforms.json").mkdir()
-    assert "unreadable" in refusal(lambda: read_drive(folder))
+    assert "file is a directory" in refusal(lambda: read_drive(folder))
 
 
 @pytest.mark.parametrize(
@@ -501,7 +501,7 @@ def test_missing_and_wrong_photographs(tmp_path: Path) -> None:
     file.unlink()
     assert "photograph is missing" in refusal(read, file.name)
     file.mkdir()
-    assert "unreadable" in refusal(read, file.name)
+    assert "photograph is a directory" in refusal(read, file.name)
     file.rmdir()
     for content, part in (
         (b"", "format is empty"),
