@@ -111,6 +111,7 @@ class _Look:
     ) -> None:
         self.system, self.workspace, self.instance = system, workspace, instance
         self.checks, self.seen = checks, seen
+        self.seen_keys = {entry["key"] for entry in seen.values()}
         self.inbox = workspace.inbox(system.name)
         self.now: dict[str, _Entry] = {}
         self.runs: list[dg.RunRequest] = []
@@ -137,7 +138,7 @@ class _Look:
                 usable = self._usable(dimension, source, before)
                 keep |= set() if usable is False else {source.key}
                 new |= {source.key} - before if usable else set()
-            gone = {key for key in before - keep if self._is_gone(dimension, key)}
+            gone = {key for key in before - keep if self._is_bare(dimension, key)}
             partitions = dynamic_partitions(self.system, dimension.name)
             if new:
                 self.changes.append(partitions.build_add_request(sorted(new)))
@@ -154,28 +155,41 @@ class _Look:
             stamp = _stamp(source, self.inbox)
         except FileNotFoundError:
             return None  # Gone while it was looked at: the next look says more.
-        except (ValueError, OSError) as error:
+        except OSError as error:
+            self.notes[name] = f"{source.name}: cannot be read ({error.strerror})."
+            return False
+        except ValueError as error:
             self.notes[name] = str(error)
             return False
-        if before is not None and before["stamp"] == stamp:
-            self.now[place] = before
-            if before["refused"]:
-                self.notes[name] = before["refused"]
-            return not before["refused"]
         if stamp is None:
             return None
-        accepted = _Entry(key=source.key, stamp=stamp, refused=None)
-        if before is None and source.key in registered:
-            self.now[place] = accepted
+        item = f"{place}:{stamp}:{source.key}"
+        if before is not None and (before["stamp"], before["key"]) == (stamp, source.key):
+            self.now[place] = before
+            if (
+                source.key in registered
+                and before["refused"]
+                and self._is_bare(dimension, source.key)
+            ):
+                # With settings of its own, like a crop, the command line can use it.
+                self.now[place] = {**before, "refused": None}
+            if not self.now[place]["refused"]:
+                return True
+            self.notes[name] = str(before["refused"])
+            if item in self.checks.answered:
+                return False
+        elif before is None and source.key in registered - self.seen_keys:
+            self.now[place] = _Entry(key=source.key, stamp=stamp, refused=None)
             return True
         try:
             refused = self.checks.problem(
-                f"{place}:{stamp}", lambda: _check(self.system, dimension, source, self.workspace)
+                item, lambda: _check(self.system, dimension, source, self.workspace)
             )
         except TimeoutError:
             return None
         if not _is_still(source, self.inbox, stamp):
             return None
+        self.notes.pop(name, None)
         self.now[place] = _Entry(key=source.key, stamp=stamp, refused=refused)
         if refused:
             self.notes[name] = refused
@@ -183,8 +197,8 @@ class _Look:
         self.runs.append(_request(self.system, dimension, source, stamp))
         return True
 
-    def _is_gone(self, dimension: Dimension, key: str) -> bool:
-        """Whether a partition that has no usable item is to go."""
+    def _is_bare(self, dimension: Dimension, key: str) -> bool:
+        """Whether a key needs a file, and no version is stored that was made of one."""
         if dimension.needs_no_file(key):
             return False
         store = self.workspace.store
@@ -203,6 +217,8 @@ class _Checks:
     """Checks one after the other in a thread beside the ticks: a large file's takes minutes."""
 
     def __init__(self) -> None:
+        self.answered: set[str] = set()
+        """What was checked by this process: another's code may refuse other things."""
         self._futures: dict[str, Future[str | None]] = {}
         self._wanted: set[str] = set()
         self._until = 0.0
@@ -225,6 +241,7 @@ class _Checks:
             Thread(target=_answer, args=(self._futures[item], check), daemon=True).start()
         problem = self._futures[item].result(self._left())
         del self._futures[item]
+        self.answered.add(item)
         return problem
 
     def _left(self) -> float:
@@ -258,7 +275,7 @@ def _check(system: System, dimension: Dimension, source: Source, workspace: Work
 
 
 def _stamp(source: Source, inbox: Path) -> str | None:
-    """Names, sizes and times of an item's files; None while it may still be on its way.
+    """Names, sizes, times and rights of an item's files; None while it may be on its way.
 
     Raises ValueError and OSError as `Source.contents`.
     """
@@ -266,7 +283,8 @@ def _stamp(source: Source, inbox: Path) -> str | None:
     own = [] if source.path is None else [source.path.stat()]  # a folder's own time
     if not all(_lies_still(status) for status in (*own, *(status for _, status in statuses))):
         return None
-    return json_hash([[name, status.st_size, status.st_mtime_ns] for name, status in statuses])[:16]
+    told = [[name, s.st_size, s.st_mtime_ns, s.st_mode] for name, s in statuses]
+    return json_hash(told)[:16]
 
 
 def _name(source: Source, inbox: Path) -> str:

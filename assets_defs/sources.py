@@ -16,6 +16,7 @@ from storage.slugs import slug
 
 NOTES = "tsuya-notes.txt"
 """Says in an inbox what lies there and is not used."""
+_LITTER = ("thumbs.db", "desktop.ini", "__macosx")
 _UNFINISHED = ("~", ".part", ".partial", ".crdownload", ".download", ".tmp")
 
 
@@ -125,8 +126,10 @@ class Found:
 
 
 def is_passed_over(name: str) -> bool:
-    """Whether a name in an inbox is hidden, unfinished (a download's), or the notes' own."""
-    return name.startswith((".", "~")) or name.lower().endswith(_UNFINISHED) or name == NOTES
+    """Whether a name in an inbox is hidden, unfinished (a download's), an operating system's
+    litter, or the notes' own."""
+    low = name.lower()
+    return low.startswith((".", "~")) or low.endswith(_UNFINISHED) or low in (NOTES, *_LITTER)
 
 
 def look_into(

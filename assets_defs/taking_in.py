@@ -41,9 +41,9 @@ def take_in(
     last = path.name not in ("", "..")
     path = path.parent.resolve() / path.name if last else path.resolve()
     _check_name(path, dimension)
-    source = Source.of(path)
     inbox = workspace.inbox(system.name)
     try:
+        source = _source(path)
         contents = source.contents()
         dimension.check(source, given)
         fingerprint = source.fingerprint
@@ -62,6 +62,12 @@ def take_in(
         ) from error
     instance.add_dynamic_partitions(system.partitions_name(dimension.name), [key])
     return key
+
+
+def _source(path: Path) -> Source:
+    """What is given; a link to a file whose companions are beside what it leads to, as that."""
+    source, real = Source.of(path), Source.of(path.resolve())
+    return real if len(real.contents()) > len(source.contents()) else source
 
 
 def _check_name(path: Path, dimension: Dimension) -> None:

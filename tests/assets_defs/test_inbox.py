@@ -229,6 +229,21 @@ def test_a_library_from_another_folder_travels_to_where_it_is_found(
     assert read_scene(source.path).materials[0].albedo == (1, 0, 0)
 
 
+def test_a_link_to_a_scene_is_taken_in_with_what_is_beside_the_scene(
+    workspace: Workspace, instance: dg.DagsterInstance, tmp_path: Path
+) -> None:
+    _scene(tmp_path / "disk", "1 0 0")
+    (tmp_path / "mine.obj").symlink_to(tmp_path / "disk" / "hall.obj")
+    dimension = SSDF.dimension("scene")
+    for _ in range(2):
+        key = take_in(tmp_path / "mine.obj", SSDF, dimension, {}, workspace, instance)
+        assert key == "mine-obj"
+    source = SSDF.source("scene", key, workspace.inbox("ssdf_lighting"))
+    assert source.path is not None
+    assert not source.path.is_symlink()
+    assert read_scene(source.path).materials[0].albedo == (1, 0, 0)
+
+
 def test_without_its_library_a_scene_is_taken_in_alone(
     workspace: Workspace, instance: dg.DagsterInstance, tmp_path: Path
 ) -> None:
@@ -456,6 +471,58 @@ def test_a_refused_item_has_no_partition_until_it_is_good(
     assert daemon.tick() == ["fox-txt"]
     assert daemon.partitions() == {"hen-txt", "fox-txt"}
     assert daemon.notes() == []
+
+
+def test_what_was_refused_is_looked_at_again_by_another_process_or_with_other_rights(
+    workspace: Workspace, instance: dg.DagsterInstance
+) -> None:
+    inbox = workspace.inbox("toy")
+    _write(inbox / "fox.txt", "bad")
+    _settle(inbox)
+    old = Daemon(instance, workspace, PICKY)
+    assert old.tick() == []
+    still = Daemon(instance, workspace, PICKY)
+    still.cursor = old.cursor
+    assert still.tick() == []
+    assert still.notes() == ["fox.txt: content is bad; expected something good."]
+    new = Daemon(instance, workspace, _toy())  # with a reader that has learnt to read it
+    new.cursor = still.cursor
+    assert new.tick() == ["fox-txt"]
+    assert new.notes() == []
+    (inbox / "fox.txt").chmod(0o600)
+    assert still.tick() == []
+    assert new.tick() == ["fox-txt"]
+
+
+def test_what_was_refused_and_is_then_registered_by_the_command_line_is_left_to_it(
+    workspace: Workspace, instance: dg.DagsterInstance
+) -> None:
+    """`--set crop=…` may make a photograph usable that is refused as a whole."""
+    _write(workspace.inbox("toy") / "fox.txt", "bad")
+    _settle(workspace.root)
+    daemon = Daemon(instance, workspace, PICKY)
+    assert daemon.tick() == []
+    instance.add_dynamic_partitions("toy_thing", ["fox-txt"])
+    for _ in range(2):
+        assert daemon.tick() == []
+        assert daemon.partitions() == {"fox-txt"}
+        assert daemon.notes() == []
+
+
+def test_an_item_whose_key_is_taken_by_another_is_made_under_its_new_one(
+    workspace: Workspace, instance: dg.DagsterInstance
+) -> None:
+    inbox = workspace.inbox("toy")
+    _scene(inbox / "mine", "1 0 0")
+    _settle(inbox)
+    daemon = Daemon(instance, workspace, _toy())
+    assert daemon.tick() == ["hall-obj"]
+    _write(inbox / "hall.obj", "v 0 0 0")
+    _settle(inbox)
+    made = daemon.tick()
+    assert len(made) == 2
+    assert set(made) == daemon.partitions()
+    assert daemon.tick() == []
 
 
 def test_a_partition_of_what_became_bad_goes_unless_something_is_stored(
