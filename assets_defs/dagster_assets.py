@@ -4,6 +4,7 @@
 import functools
 import inspect
 import math
+import traceback
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 import dagster as dg
 
 from assets_defs.checks import Check, figure_before
-from assets_defs.dagster_metadata import dagster_metadata
+from assets_defs.dagster_metadata import dagster_metadata, picture_metadata
 from assets_defs.dagster_settings import config_class
+from assets_defs.ended_runs import tag_run
 from assets_defs.memory import give_back_freed_memory
 from assets_defs.partitions import keys_of_partition
+from assets_defs.picture_links import PictureLinks
 from assets_defs.provenance import provenance
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
-from storage.errors import DamagedError, StoreError
+from storage.errors import DamagedError, NoVersionError, StoreError
 from storage.io_manager import INTERRUPTED, damage_failure
 from storage.stored_version import StoredVersion
 from storage.versions import VersionedStore
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 
 RETRIES = dg.RetryPolicy(max_retries=2, delay=1)
 OWNERS = ("team:tsuya",)
+_WRONG_PATHS = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
+_StepContext = dg.AssetExecutionContext | dg.AssetCheckExecutionContext
 
 
 def dynamic_partitions(system: System, dimension: str) -> dg.DynamicPartitionsDefinition:
@@ -99,6 +104,7 @@ def _materialise(
     config: dg.Config,
     inputs: dict[str, "xr.Dataset"],
 ) -> "dg.Output[xr.Dataset]":
+    tag_run(context.instance, context.run)
     keys = keys_of_partition(context.partition_key, plan.by)
     given = {name: value for name, value in config.model_dump().items() if value is not None}
     preset = given.pop("preset", None)
@@ -124,21 +130,38 @@ def _materialise(
         named = inspect.signature(plan.function).parameters
         dataset, metadata = plan.function(**{name: offered[name] for name in named})
         pictures = plan.pictures(dataset) if plan.pictures else {}
+        links = PictureLinks(workspace, system.slot(plan.name, keys))
+        shown = picture_metadata(pictures, links.keep) | dagster_metadata(metadata)
     except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
         # Left to itself, Dagster would take the interruption for trouble and try again.
         raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop
     except DamagedError as error:
         raise damage_failure(workspace.store, error) from error
-    except (ValueError, StoreError) as error:
-        # What the user gave cannot work: a second try would not either.
-        raise dg.Failure(description=str(error), allow_retries=False) from error
+    except Exception as error:
+        if _may_pass(error):
+            raise
+        raise _final(context, error) from None
     record = made_of | {
         "run": context.run.run_id,
         "checks": [check.name for check in plan.checks],
     }
-    return dg.Output(
-        dataset.assign_attrs({RECORD: record}), metadata=dagster_metadata({**pictures, **metadata})
-    )
+    return dg.Output(dataset.assign_attrs({RECORD: record}), metadata=shown)
+
+
+def _may_pass(error: Exception) -> bool:
+    """Whether a second try may work: a drive was away, a disk was full for a moment."""
+    return isinstance(error, OSError) and not isinstance(error, _WRONG_PATHS)
+
+
+def _final(context: _StepContext, error: Exception) -> dg.Failure:
+    """A failure that says what is wrong in one sentence; where it was raised is in the log.
+
+    What was given cannot work, or the code is wrong: a second try would not help.
+    """
+    context.log.debug("".join(traceback.format_exception(error)))
+    is_said = isinstance(error, ValueError | StoreError)
+    sentence = str(error) if is_said else f"{type(error).__name__}: {error}"
+    return dg.Failure(description=sentence, allow_retries=False)
 
 
 def _dagster_check(
@@ -157,10 +180,14 @@ def _dagster_check(
         required_resource_keys={"workspace"},
     )
     def evaluate(context: dg.AssetCheckExecutionContext) -> dg.AssetCheckResult:
+        tag_run(context.instance, context.run)
         store: VersionedStore = context.resources.workspace.store
         slot = system.slot(plan.name, keys_of_partition(context.partition_key, plan.by))
-        version = StoredVersion(store, slot, store.version_under_check(slot, context.run.run_id))
-        return _evaluated(check, version)
+        try:
+            under_check = store.version_under_check(slot, context.run.run_id)
+        except NoVersionError as error:
+            raise _final(context, error) from None
+        return _evaluated(check, StoredVersion(store, slot, under_check))
 
     return evaluate
 
@@ -168,7 +195,7 @@ def _dagster_check(
 def _evaluated(check: Check, version: StoredVersion) -> dg.AssetCheckResult:
     """Compute the figure, note the verdict in the store, say it to Dagster."""
     store, slot = version.store, version.slot
-    metadata: dict[str, Any] = {"version": version.version}
+    metadata: dict[str, Any] = {"partition": slot.partition, "version": version.version}
     try:
         figure = check.figure(version)
     except DamagedError as error:

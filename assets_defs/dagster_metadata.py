@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import dagster as dg
@@ -13,13 +13,35 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+PICTURE = "picture: "
+FULL_SIZE = "full size: "
 MOST_BYTES = 100_000
 _WIDEST = 512
 
 
 def dagster_metadata(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """An asset's metadata as Dagster takes them: lists of rows become tables, arrays thumbnails."""
+    """An asset's metadata as Dagster takes them: lists of rows become tables, arrays thumbnails.
+
+    Raises ValueError for a name that is kept for pictures.
+    """
+    for name in metadata:
+        if name.startswith((PICTURE, FULL_SIZE)):
+            raise ValueError(f"metadata {name!r} is named like a picture; expected another name.")
     return {name: _shown(value) for name, value in metadata.items()}
+
+
+def picture_metadata(
+    pictures: Mapping[str, NDArray[np.uint8]], link: Callable[[str, NDArray[np.uint8]], str]
+) -> dict[str, Any]:
+    """A thumbnail of each picture, and what ``link`` says of where it is in full size.
+
+    Their names are no other metadata's: a figure may be called like the picture that it is of.
+    """
+    shown: dict[str, Any] = {}
+    for name, picture in pictures.items():
+        shown[PICTURE + name] = thumbnail(picture)
+        shown[FULL_SIZE + name] = dg.MetadataValue.url(link(name, picture))
+    return shown
 
 
 def _shown(value: Any) -> Any:
@@ -31,10 +53,13 @@ def _shown(value: Any) -> Any:
 
 
 def thumbnail(picture: NDArray[np.uint8]) -> dg.MarkdownMetadataValue:
-    """A picture (y, x) or (y, x, 3) as a Markdown data URI of at most 100 kB."""
+    """A picture (y, x) or (y, x, 3) as a Markdown data URI of at most 100 kB.
+
+    Of a moving one (frame, y, x, 3) the first frame.
+    """
     from PIL import Image
 
-    image = Image.fromarray(picture)
+    image = Image.fromarray(picture if picture.ndim < 4 else picture[0])
     side = _WIDEST
     while True:
         small = image.copy()

@@ -87,7 +87,7 @@ def tag_run(instance: dg.DagsterInstance, run: dg.DagsterRun) -> None:
 
 def end_dead_runs(instance: dg.DagsterInstance) -> list[str]:
     """End every run of this host whose process is gone, with a sentence in its log; their ids."""
-    return [run_id for run_id in _end(instance)]
+    return list(_end(instance))
 
 
 def _end(instance: dg.DagsterInstance) -> Iterator[str]:

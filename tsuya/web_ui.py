@@ -1,15 +1,20 @@
-"""``tsuya ui``: the web UI with its daemon, once for each data folder, at a free port."""
+"""``tsuya ui``: the web UI with its daemon, once for each data folder, at a free port.
+
+Beside it a small server answers the web UI's links to pictures of full size.
+"""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import socket
+import subprocess
 import sys
 from pathlib import Path
 
 import click
 
+from assets_defs.picture_links import note_picture_port, picture_folder, picture_port
 from assets_defs.workspace import CHECKOUT, Workspace
 from tsuya.console import SetUpError
 
@@ -24,7 +29,8 @@ def serve(port: int | None) -> None:
     Where one runs already on the same data, say so and end: two daemons would launch everything
     twice. Raises SetUpError for a port that is in use and where ``make setup`` has not been run.
     """
-    root = Workspace.of_checkout().root
+    workspace = Workspace.of_checkout()
+    root = workspace.root
     if not os.environ.get("DAGSTER_HOME"):
         raise SetUpError(f"{CHECKOUT}: DAGSTER_HOME is not set; expected `make setup` to be run.")
     root.mkdir(parents=True, exist_ok=True)
@@ -41,14 +47,43 @@ def serve(port: int | None) -> None:
         lock.flush()
         click.echo(f"Web UI: {address} (Ctrl-C ends it)", err=True)
         sys.stderr.flush()
+        _serve_pictures(workspace)
         # The lock lives as long as the process that this one becomes.
         os.set_inheritable(lock.fileno(), True)
         os.environ["VIRTUAL_ENV"] = sys.prefix  # else dg warns of an environment not activated
         os.chdir(os.environ["DAGSTER_HOME"])  # a .env beside it would win over the environment
         program = str(Path(sys.executable).with_name("dg"))
         place = ["--host", _HOST, "--port", address.rpartition(":")[2]]
-        workspace = ["--workspace", str(CHECKOUT / "workspace.yaml")]
-        os.execv(program, [program, "dev", "--use-active-venv", *place, *workspace])
+        loaded = ["--workspace", str(CHECKOUT / "workspace.yaml")]
+        os.execv(program, [program, "dev", "--use-active-venv", *place, *loaded])
+
+
+def _serve_pictures(workspace: Workspace) -> None:
+    """Start the server of pictures; it ends with this process, also when that is another program.
+
+    Where the data folder's port is in use, it has another one from now on.
+    """
+    own = picture_port(workspace)
+    for number in (own, 0):
+        listener = socket.socket()
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((_HOST, number))
+        except OSError:
+            listener.close()
+            continue
+        with listener:
+            bound = listener.getsockname()[1]
+            if bound != own:
+                note_picture_port(workspace, bound)
+            told = [str(picture_folder(workspace)), str(listener.fileno()), str(os.getpid())]
+            subprocess.Popen(
+                [sys.executable, "-m", "assets_defs.picture_server", *told],
+                cwd=CHECKOUT,
+                pass_fds=[listener.fileno()],
+                stdin=subprocess.DEVNULL,
+            )
+        return
 
 
 def _free_port(port: int | None) -> int:

@@ -74,7 +74,8 @@ def test_a_killed_processes_runs_are_ended_and_say_why(instance: dg.DagsterInsta
     assert set(end_dead_runs(instance)) == set(ended)
     assert {run_id: _status(instance, run_id) for run_id in ended} == ended
     assert [(run_id, _status(instance, run_id)) for run_id, _ in left] == left
-    said = [entry.user_message for entry in instance.all_logs(next(iter(ended)))]
+    events = [entry.dagster_event for entry in instance.all_logs(next(iter(ended)))]
+    said = [str(event.message) for event in events if event]
     assert any("has ended: it was killed" in message and "\n" not in message for message in said)
     assert end_dead_runs(instance) == []
 
