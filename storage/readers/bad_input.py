@@ -27,7 +27,7 @@ class BadInput(ValueError):  # noqa: N818 - read aloud: "raises BadInput"
     def __init__(self, file: str | PathLike[str], field: str, found: str, expected: str) -> None:
         self.file = fspath(file)
         self.field = shortened(field)
-        self.found = shortened(found)
+        self.found = shortened(found) or "empty"
         self.expected = expected
         name = shortened(PurePath(self.file).name or self.file)
         sentence = f"{name}: {self.field} is {self.found}; expected {expected}."
