@@ -83,6 +83,8 @@ class Launcher:
     workspace: Workspace
     job: JobByName
     progress: LaunchProgress
+    tags: Mapping[str, str] = field(default_factory=dict)
+    """Of every run: who executes it, what launched it."""
 
     def launch(
         self,
@@ -201,6 +203,7 @@ class Launcher:
             run_config={"ops": ops, "loggers": _QUIET},
             instance=self.instance,
             partition_key=partition_key(keys),
+            tags=dict(self.tags),
             raise_on_error=False,
             asset_selection=[dg.AssetKey([system.name, name]) for name in stale],
         )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -45,6 +46,8 @@ class Interruption:
         writes.setblocking(False)
         self._writes = writes
         self._before = signal.set_wakeup_fd(writes.fileno(), warn_on_full_buffer=False)
+        self._unraisable = sys.unraisablehook
+        sys.unraisablehook = self._overhear
         threading.Thread(target=self._listen, name="interruption", daemon=True).start()
         return self
 
@@ -55,8 +58,14 @@ class Interruption:
         trace: TracebackType | None,
     ) -> None:
         self._left.set()
+        sys.unraisablehook = self._unraisable
         signal.set_wakeup_fd(self._before)
         self._writes.close()
+
+    def _overhear(self, unraisable: sys.UnraisableHookArgs) -> None:
+        """An interruption that was raised where nobody can catch it: it was heard here."""
+        if not self._asked.is_set():
+            self._unraisable(unraisable)
 
     def _listen(self) -> None:
         while True:

@@ -15,6 +15,7 @@ import dagster as dg
 from rich.console import Console
 
 from assets_defs.definitions import build_definitions
+from assets_defs.ended_runs import end_dead_runs, process_tags
 from assets_defs.launcher import Launcher, LaunchError, Outcome, Request
 from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import Workspace
@@ -57,9 +58,10 @@ def open_session() -> Iterator[Session]:
                 raise KeyboardInterrupt
             display(what, fraction)
 
+        end_dead_runs(instance)  # of commands before, that were killed
         definitions = build_definitions(workspace, {"progress": progress})
         job = definitions.get_repository_def().get_job
-        launcher = Launcher(instance, workspace, job, progress)
+        launcher = Launcher(instance, workspace, job, progress, process_tags())
         yield Session(workspace, instance, launcher, display.say)
 
 
