@@ -86,18 +86,22 @@ def check_link(path: Path, within: Path | None = None) -> None:
 def _files_below(folder: Path, within: Path | None, above: tuple[Path, ...]) -> Iterator[Path]:
     """Files in a folder and below; ``above``: where the folders really are that hold this one."""
     chain = (*above, folder.resolve())
-    for entry in folder.iterdir():
-        check_link(entry, within)
-        if entry.is_dir():
-            target = entry.resolve()
-            if entry.is_symlink() and any(target in (real, *real.parents) for real in chain):
+    with os.scandir(folder) as listed:
+        entries = list(listed)
+    for entry in entries:
+        path = folder / entry.name
+        if entry.is_symlink():
+            check_link(path, within)
+            target = path.resolve()
+            if path.is_dir() and any(target in (real, *real.parents) for real in chain):
                 raise ValueError(
-                    f"{entry.name}: is a link to {os.readlink(entry)}, a folder that it lies in "
+                    f"{entry.name}: is a link to {os.readlink(path)}, a folder that it lies in "
                     f"itself ({folder.name}); expected no circle. Delete the link."
                 )
-            yield from _files_below(entry, within, chain)
-        elif stat.S_ISREG(entry.stat().st_mode):
-            yield entry
+        if entry.is_dir():
+            yield from _files_below(path, within, chain)
+        elif entry.is_file():
+            yield path
         else:
             raise ValueError(f"{entry.name}: is neither a file nor a folder; expected one of them.")
 
