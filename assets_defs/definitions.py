@@ -9,7 +9,10 @@ from typing import Any
 import dagster as dg
 
 from assets_defs.dagster_assets import dagster_assets, dagster_checks
+from assets_defs.ended_runs import ended_runs_sensor
+from assets_defs.graph_job import graph_job
 from assets_defs.inbox import inbox_sensor
+from assets_defs.launcher import JobByName
 from assets_defs.rematerialisation import daily_schedule, launch_job
 from assets_defs.system import System
 from assets_defs.systems import SYSTEMS
@@ -36,13 +39,15 @@ def build_definitions(
     jobs = [_grain_job(system, by) for system in systems for by in system.grains()]
     # The sensor's own owners are a beta of Dagster's that nothing here uses.
     warnings.filterwarnings("ignore", category=dg.BetaWarning)
-    launch = launch_job(SYSTEMS, lambda name: definitions.get_repository_def().get_job(name))
+    find: JobByName = lambda name: definitions.get_repository_def().get_job(name)  # noqa: E731
+    launch = launch_job(SYSTEMS, find)
+    jobs += [graph_job(system, find) for system in systems]
     definitions = dg.Definitions(
         assets=[asset for system in systems for asset in dagster_assets(system)],
         asset_checks=[check for system in systems for check in dagster_checks(system)],
         jobs=[*jobs, launch],
         schedules=[daily_schedule(launch)],
-        sensors=[inbox_sensor(launch, SYSTEMS, place)],
+        sensors=[inbox_sensor(launch, SYSTEMS, place), ended_runs_sensor()],
         resources=provided,
         executor=dg.in_process_executor,
     )

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import dagster as dg
 from pydantic import Field
 
-from assets_defs.launcher import JobByName, Launcher, LaunchError, Request
+from assets_defs.graph_job import launch_here
+from assets_defs.launcher import JobByName, Request
 from assets_defs.system import System
 
 
@@ -28,21 +29,17 @@ def launch_job(systems: Mapping[str, System], job: JobByName) -> dg.JobDefinitio
 
     @dg.op(required_resource_keys={"workspace", "progress"})
     def launch_graph(context: dg.OpExecutionContext, config: LaunchConfig) -> None:
-        workspace, progress = context.resources.workspace, context.resources.progress
-        launcher = Launcher(context.instance, workspace, job, progress)
+        workspace = context.resources.workspace
         chosen = [systems[config.system]] if config.system else list(systems.values())
-        failures = []
-        for system in chosen:
-            partitions = config.partitions or system.stored_partitions(workspace)
-            try:
-                outcomes = launcher.launch(Request(system, partitions, force=config.force))
-            except LaunchError as error:
-                failures.append(str(error))
-                outcomes = list(error.outcomes)
-            for outcome in outcomes:
-                context.log.info(f"{outcome.slot}: {outcome.state}")
-        if failures:
-            raise dg.Failure("\n".join(failures), allow_retries=False)
+        requests = [
+            Request(
+                system,
+                config.partitions or system.stored_partitions(workspace),
+                force=config.force,
+            )
+            for system in chosen
+        ]
+        launch_here(context, job, requests)
 
     @dg.job(
         name="launch",
