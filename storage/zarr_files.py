@@ -45,7 +45,6 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
     ``record`` becomes the group attribute ``tsuya``. Memory stays bounded by a few chunks a
     thread. Raises StoreFullError when the disk fills up.
     """
-    from zarr.codecs import Crc32cCodec, ZstdCodec
     from zarr.storage import LocalStore
 
     prepared = dataset.assign_attrs({RECORD: record})
@@ -57,7 +56,7 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
             prepared[name] = prepared[name].chunk(dict(zip(variable.dims, chunks, strict=True)))
         encoding[str(name)] = {
             "chunks": chunks,
-            "compressors": (ZstdCodec(level=0), Crc32cCodec()),
+            "compressors": _codecs(),
             "write_empty_chunks": True,
             "_FillValue": None,
         }
@@ -127,6 +126,11 @@ def verify(folder: Path) -> None:
     """Raise DamagedError unless all bytes of a published group are those that were written."""
     record = read_record(folder)
     verify_complete(folder)
+    for name, metadata in _verified_metadata(folder).items():
+        if _has_checksums(metadata):
+            for chunk in _chunk_files(folder / name, metadata):
+                key = chunk.relative_to(folder).as_posix()
+                _check_chunk(folder, key, memoryview(chunk.read_bytes()))
     if "content" in record and content_hash(folder) != record["content"]:
         raise DamagedError(folder, "its content hash is not the one that was noted")
 
@@ -149,7 +153,7 @@ def content_hash(folder: Path) -> str:
 
     The dataset's own attributes count; the store's record (settings, times) does not, so two runs
     that give the same arrays have the same hash. Checksums do not count either: they were added
-    when there were versions already. Raises DamagedError where a chunk has not its checksum.
+    when there were versions already.
     """
     attributes = json.loads((folder / "zarr.json").read_bytes())["attributes"]
     attributes.pop(RECORD, None)
@@ -163,10 +167,7 @@ def content_hash(folder: Path) -> str:
         for chunk in _chunk_files(folder / name, metadata):
             data = memoryview(chunk.read_bytes())
             key = chunk.relative_to(folder).as_posix()
-            if checked:
-                _check_chunk(folder, key, data)
-                data = data[:-_CHECKSUM_BYTES]
-            digests.append(f"{key}:{_hash(data)}")
+            digests.append(f"{key}:{_hash(data[:-_CHECKSUM_BYTES] if checked else data)}")
     return _hash("\n".join(sorted(digests)).encode())
 
 
@@ -271,6 +272,13 @@ def _check_chunk(folder: Path, key: str, data: memoryview) -> None:
         raise DamagedError(folder, f"chunk {key} is damaged: it has not its checksum")
 
 
+def _codecs() -> tuple[Any, ...]:
+    """What a chunk's bytes go through: compressed as Zarr does by default, then a checksum."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    return ZstdCodec(level=0), Crc32cCodec()
+
+
 def _chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
     """Whole trailing axes, leading ones split, so that a chunk is about CHUNK_TARGET_BYTES."""
     chunks = [max(1, length) for length in shape]  # A chunk of an empty axis still has a length.
@@ -329,8 +337,9 @@ def _strict_store(folder: Path, arrays: frozenset[str], checked: frozenset[str])
     class StrictStore(WrapperStore[Any]):
         """Raises DamagedError, naming the chunk, where zarr would return the fill value or noise.
 
-        It has these arrays and nothing that lies beside them; the chunks of those in ``checked``
-        have checksums.
+        It has these arrays and nothing that lies beside them. The chunks of those in ``checked``
+        have checksums: they are compared and taken off here, once, where a chunk's name is known;
+        to zarr it looks as if there were none.
         """
 
         async def list_dir(self, prefix: str) -> AsyncIterator[str]:
@@ -343,8 +352,12 @@ def _strict_store(folder: Path, arrays: frozenset[str], checked: frozenset[str])
             chunk = _CHUNK_KEY.match(key)
             if chunk and value is None:
                 raise MissingChunkError(folder, f"chunk {key} is missing")
-            if chunk and chunk[1] in checked and byte_range is None:
+            if chunk and chunk[1] in checked:
                 _check_chunk(folder, key, memoryview(value.as_numpy_array()))
+                return value[:-_CHECKSUM_BYTES]
+            if key.removesuffix("/zarr.json") in checked:
+                plain = _without_checksums(json.loads(value.to_bytes()))
+                return prototype.buffer.from_bytes(plain)
             return value
 
     return StrictStore
