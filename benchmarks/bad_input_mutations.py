@@ -12,7 +12,7 @@ import zipfile
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.bad_input_cases import Case, glb, with_png_checksums, zipped
+from benchmarks.bad_input_files import Case, glb, with_png_checksums, zipped
 
 _NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _WORDS = (

@@ -25,7 +25,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.bad_input_cases import Case, named_cases, valid_cases
+from benchmarks.bad_input_cases import named_cases
+from benchmarks.bad_input_files import Case, valid_cases
 from benchmarks.bad_input_mutations import mutated
 from storage.readers import BadInput
 from storage.readers.btf import open_btf
@@ -124,7 +125,9 @@ def case_of(index: int, seed: int, named: Sequence[Case], valid: Sequence[Case])
     if index < len(named):
         return named[index]
     chance = random.Random(f"{seed} {index}")
-    return mutated(valid[(index - len(named)) % len(valid)], chance)
+    readers = list(dict.fromkeys(case.reader for case in valid))
+    reader = readers[index % len(readers)]  # as many of each, however many formats it reads
+    return mutated(chance.choice([case for case in valid if case.reader == reader]), chance)
 
 
 def written(case: Case, folder: Path) -> Path:

@@ -18,6 +18,7 @@ from storage.readers.bad_input import BadInput
 from storage.readers.btf_archives import Members
 from storage.readers.btf_measured import check_area
 from storage.readers.btf_radiance import SIGNATURE, radiance_header
+from storage.readers.image_decoding import MEMORY_PER_BYTE
 from storage.readers.opening import check_memory
 
 _EIGHT_BITS = "8-bit RGB"
@@ -27,7 +28,6 @@ _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0 ... SOF
 _EXR_TYPES = {0: "unsigned", 1: "half", 2: "float"}
 _EXR_NOT_FLAT = 0x800  # deep data
 _PIXEL_BYTES = 40  # of one photograph while it is decoded
-_MEMORY_PER_BYTE = 500  # the best compressed photographs
 _REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _CIE_XYZ = (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)
 
@@ -73,7 +73,7 @@ def common_header(members: Members, names: Sequence[str]) -> Header:
     check_area(file, common.width, common.height)
     found = f"{common.width} x {common.height} pixels"
     smallest = min(members.size(name) for name in names)
-    check_memory(file, "size", found, _PIXEL_BYTES * pixels, smallest, _MEMORY_PER_BYTE)
+    check_memory(file, "size", found, _PIXEL_BYTES * pixels, smallest, MEMORY_PER_BYTE)
     return common
 
 

@@ -23,6 +23,9 @@ TRANSFORMS = "transforms.json"
 LARGEST_SIDE = 32_766
 """Pixels; OpenCV's undistortion counts them in 16 bits."""
 
+MOST_FRAMES = 40_000
+"""Read and checked in some seconds."""
+
 _EXPECTED = "a folder with transforms.json, as nerfstudio and instant-ngp have it"
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "OPENCV", "SIMPLE_RADIAL", "RADIAL")
 _FARTHEST = 1e8  # metres: more than any coordinate on earth, in whatever grid
@@ -86,6 +89,8 @@ def read_transforms(path: str | os.PathLike[str]) -> tuple[Path, list[Frame]]:
     listed = _required(file, [("", top)], "frames", "a list of frames")
     if not isinstance(listed, list):
         raise BadInput(file, "frames", _shown(listed), "a list of frames")
+    if len(listed) > MOST_FRAMES:
+        raise BadInput(file, "number of frames", f"{len(listed)}", f"at most {MOST_FRAMES}")
     cameras = _object(file, "cameras", top.get("cameras", {}))
     return file, [_frame(file, row, entry, cameras, top) for row, entry in enumerate(listed)]
 

@@ -8,6 +8,7 @@ and its unit is the metre: neither can be seen in the file, so both are the user
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 from os import PathLike
@@ -19,10 +20,12 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown_number
-from storage.readers.image_decoding import LARGEST_PICTURE, decode_image
-from storage.readers.opening import first_bytes
+from storage.readers.image_decoding import LARGEST_PICTURE, MEMORY_PER_BYTE, decode_image
+from storage.readers.opening import check_file, check_memory, first_bytes
 
 FEWEST_CAMERAS = 2
+MOST_CAMERAS = 500
+"""Each is compared with each."""
 FEWEST_INSTANTS = 3
 LEAST_BASELINE = 1e-3
 """Metres between two cameras of one instant."""
@@ -110,9 +113,13 @@ def read_frame(drive: Drive, frame: int) -> NDArray[np.uint8]:
     photographed is black. Grey ones get three equal channels, 16 bit codes are rounded to 8 bit.
 
     Raises BadInput as :func:`decode_image` does, for transparent pixels, and for a photograph that
-    has another size than when the drive was read; IndexError for an instant that is not there.
+    has another size than when the drive was read or is missing; for more photographs than their
+    files' sizes stand for; IndexError for an instant that is not there.
     """
     shape = (len(drive.cameras), drive.height, drive.width, 3)
+    stored = sum(check_file(file, _PHOTOGRAPH, LARGEST_PICTURE) for file in drive.files[frame])
+    found = f"{shape[0]} photographs of {drive.width} x {drive.height} pixels"
+    check_memory(drive.file, "instant", found, 2 * math.prod(shape), stored, MEMORY_PER_BYTE)
     pictures = np.empty(shape, np.uint8)
     lenses = zip(drive.intrinsics, drive.distortion, strict=True)
     for picture, file, lens in zip(pictures, drive.files[frame], lenses, strict=True):
@@ -140,6 +147,8 @@ def _instants(file: Path, frames: Sequence[Frame]) -> list[dict[str, Frame]]:
     ):
         if number < fewest:
             raise BadInput(file, f"number of {what}", f"{number}", f"at least {fewest}")
+    if len(names) > MOST_CAMERAS:
+        raise BadInput(file, "number of cameras", f"{len(names)}", f"at most {MOST_CAMERAS}")
     for time, instant in sorted(by_time.items()):
         if instant.keys() != names:
             field = f"set of cameras at time {shown_number(time)}"

@@ -19,7 +19,7 @@ from storage.readers.btf_radiance import (
     radiance_header,
     radiance_pixels,
 )
-from storage.readers.image_decoding import LARGEST_PICTURE, decode_image
+from storage.readers.image_decoding import LARGEST_PICTURE, MEMORY_PER_BYTE, decode_image
 from storage.readers.opening import check_memory, first_bytes
 
 SMALLEST_WIDTH = 16
@@ -35,7 +35,7 @@ _OTHER_SIGNATURES = {
 }
 _LONGEST_HEADER = 1_000_000  # bytes of a Radiance header; the usual ones have some hundred
 _LONGEST_RUN = 127  # of a Radiance picture
-_PIXEL_BYTES, _MEMORY_PER_BYTE = 40, 500
+_PIXEL_BYTES = 40
 _CHANNELS = {1: ("grey",), 3: ("red", "green", "blue")}
 
 
@@ -134,7 +134,7 @@ def _check_memory(file: Path, header: RadianceHeader) -> None:
     if _LONGEST_RUN * stored < 2 * 4 * pixels:  # two bytes a run of one of four channels
         raise _damaged(file, "Radiance")
     found = f"{header.width} x {header.height} pixels"
-    check_memory(file, "size", found, _PIXEL_BYTES * pixels, stored, _MEMORY_PER_BYTE)
+    check_memory(file, "size", found, _PIXEL_BYTES * pixels, stored, MEMORY_PER_BYTE)
 
 
 def _check_radiance(file: Path, light: NDArray[np.float32]) -> None:

@@ -10,7 +10,8 @@ from storage.readers.opening import check_memory
 
 DEEPEST_TREE = 64
 """Nodes below each other."""
-MOST_STEPS = 1_000_000
+MOST_NODES = 50_000
+MOST_STEPS = 500_000
 """From the scene down to each of its nodes, all of them together."""
 
 _VERTEX_BYTES, _CORNER_BYTES = 80, 110  # of what is placed, measured up to its triangles
@@ -40,7 +41,7 @@ def check_sizes(file: Path, file_bytes: int, description: dict[str, Any]) -> Non
     ]
     nodes = description.get("nodes", [])
     placed = [node["mesh"] for node in nodes if "mesh" in node]
-    needed += sum(meshes) / 4 + sum(meshes[mesh] for mesh in placed if mesh < len(meshes))
+    needed += sum(meshes) // 4 + sum(meshes[mesh] for mesh in placed if mesh < len(meshes))
     found = f"{len(meshes)} meshes in {len(placed)} places"
     check_memory(file, "geometry", found, needed, file_bytes, _MEMORY_PER_BYTE)
     _check_tree(file, nodes)
@@ -59,6 +60,8 @@ def _check_tree(file: Path, nodes: list[dict[str, Any]]) -> None:
     children = [child for node in nodes for child in node.get("children", ())]
     if len(children) > len(set(children)):
         raise BadInput(file, "tree of nodes", "without an order", "one parent at most of each node")
+    if len(nodes) > MOST_NODES:
+        raise BadInput(file, "number of nodes", f"{len(nodes)}", f"at most {MOST_NODES}")
     level = sorted(set(range(len(nodes))) - set(children))
     steps = depth = seen = 0
     while level:

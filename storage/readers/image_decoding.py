@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 LARGEST_MEGAPIXELS = 400
 LARGEST_PICTURE = 4 << 30
 """Bytes of a file."""
+MEMORY_PER_BYTE = 500
+"""Of a file: the best compressed photographs take as much, and what unfolds to more is none."""
 FORMATS = "a PNG, JPEG, TIFF or EXR photograph"
 
 _PNG_END = b"IEND\xaeB`\x82"  # the last chunk's name and checksum, the same in every PNG
 _SRGB_GAMMA = 0.45455
-_MEMORY_PER_BYTE = 500  # the best compressed photographs; what unfolds to more is no photograph
 _MOST_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
 _UPRIGHT: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     1: lambda a: a,
@@ -96,7 +97,7 @@ def _check_area(file: Path, width: int, height: int, pixel_bytes: int) -> None:
         raise BadInput(file, "size", found, f"at most {LARGEST_MEGAPIXELS} megapixels")
     # Decoded, turned about and converted, then three floats and what is asked of each.
     needed = width * height * (3 * pixel_bytes + 20)
-    check_memory(file, "size", found, needed, file.stat().st_size, _MEMORY_PER_BYTE)
+    check_memory(file, "size", found, needed, file.stat().st_size, MEMORY_PER_BYTE)
 
 
 # --- PNG and JPEG -------------------------------------------------------------------------------

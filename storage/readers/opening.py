@@ -86,7 +86,7 @@ def unreadable(path: str | PathLike[str], error: OSError, expected: str) -> BadI
 
 
 def check_memory(
-    file: Path, field: str, found: str, needed: float, file_bytes: int, per_byte: int
+    file: Path, field: str, found: str, needed: int, file_bytes: int, per_byte: int
 ) -> None:
     """Raise BadInput where what a file announces takes more than a GiB, unless its own size
     stands for it: ``needed`` and ``file_bytes`` are bytes, ``per_byte`` how many may be taken for
@@ -95,7 +95,7 @@ def check_memory(
         expected = (
             f"what takes at most {LARGEST_MEMORY >> 20} MiB from a file of {file_bytes} bytes"
         )
-        raise BadInput(file, field, f"{found} ({needed / (1 << 20):.0f} MiB)", expected)
+        raise BadInput(file, field, f"{found} ({needed >> 20} MiB)", expected)
 
 
 def number(word: str | bytes) -> float:

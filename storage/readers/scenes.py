@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.bad_input import BadInput
+from storage.readers.bad_input import BadInput, shortened
 from storage.readers.glb_files import GlbFile, read_glb
 from storage.readers.meshes import check_polygons, mesh_format, split_by_uv
 from storage.readers.obj_files import ObjFile, read_obj
@@ -211,18 +211,25 @@ def _obj_materials(file: Path, obj: ObjFile) -> tuple[NDArray[np.int64], list[Ma
         rows, names = _numbered([part.object if objects else part.group for part in obj.parts])
         return rows, [default_material(name or "default") for name in names], []
     rows, names = _numbered([part.material for part in obj.parts])
-    missing: list[str] = []
-    known: dict[str, Material] = {"": default_material()}
-    for line in obj.libraries:
+    missing: dict[str, None] = {}  # in order, each once: a file may name one a million times
+    there: dict[Path, None] = {}
+    for line in dict.fromkeys(obj.libraries):
         libraries, absent = _libraries(file, line)
-        missing += absent
-        for library in libraries:
-            known = _read_library(library) | known  # the first library that has a name is right
+        missing |= dict.fromkeys(absent)
+        there |= dict.fromkeys(libraries)
+    known: dict[str, Material] = {"": default_material()}
+    for library in there:
+        known = _read_library(library) | known  # the first library that has a name is right
     unknown = [name for name in names if name not in known]
     if unknown and missing:
-        notes = [f"{name} is missing: its materials are the default grey." for name in missing]
+        notes = [
+            f"{shortened(name)} is missing: its materials are the default grey." for name in missing
+        ]
     else:
-        notes = [f"'{name}' is in no material library: it is the default grey." for name in unknown]
+        notes = [
+            f"'{shortened(name)}' is in no material library: it is the default grey."
+            for name in unknown
+        ]
     return rows, [known.get(name) or default_material(name) for name in names], notes
 
 

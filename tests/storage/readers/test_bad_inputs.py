@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.bad_input_cases import Case, named_cases, valid_cases
+from benchmarks.bad_input_cases import named_cases
+from benchmarks.bad_input_files import Case, valid_cases
 from benchmarks.bad_inputs import READERS, judged, report, written
 from storage.readers import BadInput
 from storage.readers.bad_input import MOST_QUOTED
