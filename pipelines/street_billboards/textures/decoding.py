@@ -151,9 +151,8 @@ def decode_colours(
     data: Decodable, billboard: int, pair: ViewPair, out: NDArray[np.float32]
 ) -> None:
     """Colours between two views of a billboard into ``out`` (3, 32, 32), codes, clamped."""
-    _decode_channel(data, 0, billboard, pair, out[0])
-    _decode_channel(data, 1, billboard, pair, out[1])
-    _decode_channel(data, 2, billboard, pair, out[2])
+    for channel in range(3):
+        _decode_channel(data, channel, billboard, pair, out[channel])
     for y in range(SIDE):
         for x in range(SIDE):
             red, green, blue = out[0, y, x], out[1, y, x], out[2, y, x]

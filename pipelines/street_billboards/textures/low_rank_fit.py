@@ -355,8 +355,15 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             root[m, k] = turned[m, k] * size
             back[k, m] = turned[m, k] / size if size > 1e-6 else 0.0
     # weights @ images = (weights @ root) @ (back @ images); the rows of the latter are orthonormal.
-    left, lengths, right = np.linalg.svd(weights.astype(np.float64) @ root, full_matrices=False)
-    new = (right @ back).astype(np.float32) @ images
+    scaled = _product(weights.astype(np.float64), root)
+    left, lengths, right = np.linalg.svd(scaled, full_matrices=False)
+    turn = _product(right, back)
+    new = np.zeros((len(turn), texels), np.float32)
+    for k in range(len(turn)):
+        for m in range(rank):
+            share = np.float32(turn[k, m])
+            for p in range(texels):
+                new[k, p] += share * images[m, p]
     images[:] = 0.0
     weights[:] = 0.0
     size = np.sqrt(np.float64(texels))
@@ -365,6 +372,17 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             images[k, p] = new[k, p] * size
         for i in range(views):
             weights[i, k] = left[i, k] * lengths[k] / size
+
+
+@njit(cache=True, nogil=True)
+def _product(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product of two small matrices: numba takes seconds to compile its own, for the messages."""
+    product = np.zeros((one.shape[0], other.shape[1]), np.float64)
+    for i in range(one.shape[0]):
+        for j in range(other.shape[1]):
+            for k in range(one.shape[1]):
+                product[i, j] += one[i, k] * other[k, j]
+    return product
 
 
 @njit(cache=True, nogil=True)
