@@ -10,10 +10,12 @@ import dagster as dg
 
 from assets_defs.dagster_assets import dagster_assets, dagster_checks
 from assets_defs.ended_runs import ended_runs_sensor
+from assets_defs.failure_reports import failure_sensor
 from assets_defs.graph_job import graph_job
 from assets_defs.inbox import inbox_sensor
 from assets_defs.launcher import JobByName
 from assets_defs.rematerialisation import daily_schedule, launch_job
+from assets_defs.retention import retention_sensor
 from assets_defs.system import System
 from assets_defs.systems import SYSTEMS
 from assets_defs.workspace import Workspace
@@ -23,7 +25,7 @@ from storage.io_manager import ZarrIOManager
 def build_definitions(
     workspace: Workspace | None = None, resources: Mapping[str, Any] | None = None
 ) -> dg.Definitions:
-    """All systems' assets, checks, jobs, schedule and sensor.
+    """All systems' assets, checks, jobs, schedule and sensors.
 
     ``workspace`` is where data lie, by default the environment's; ``resources`` replace those of
     the same names.
@@ -42,12 +44,18 @@ def build_definitions(
     find: JobByName = lambda name: definitions.get_repository_def().get_job(name)  # noqa: E731
     launch = launch_job(SYSTEMS, find)
     jobs += [graph_job(system, find) for system in systems]
+    keys = [dg.AssetKey([system.name, name]) for system in systems for name in system.plans]
     definitions = dg.Definitions(
         assets=[asset for system in systems for asset in dagster_assets(system)],
         asset_checks=[check for system in systems for check in dagster_checks(system)],
         jobs=[*jobs, launch],
         schedules=[daily_schedule(launch)],
-        sensors=[inbox_sensor(launch, SYSTEMS, place), ended_runs_sensor()],
+        sensors=[
+            inbox_sensor(launch, SYSTEMS, place),
+            ended_runs_sensor(),
+            failure_sensor(place, SYSTEMS),
+            retention_sensor(place, keys),
+        ],
         resources=provided,
         executor=dg.in_process_executor,
     )

@@ -7,7 +7,6 @@ tags that lead back to it.
 
 # Dagster looks at the annotations of ops themselves: no postponed ones here.
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import dagster as dg
@@ -32,12 +31,14 @@ def launch_here(
     ``workspace`` and ``progress``.
     """
     tag_run(context.instance, context.run)
+    resources = context.resources
     launcher = Launcher(
-        context.instance, context.resources.workspace, job, context.resources.progress
+        context.instance,
+        resources.workspace,
+        job,
+        resources.progress,
+        tags=_child_tags(context.run),
     )
-    changed: Any = {"tags": _child_tags(context.run)}
-    if changed.keys() <= Launcher.__dataclass_fields__.keys():
-        launcher = replace(launcher, **changed)
     failures = []
     for request in requests:
         try:
