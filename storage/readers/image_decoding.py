@@ -34,7 +34,8 @@ FORMATS = "a PNG, JPEG, TIFF or EXR photograph"
 
 _PNG_END = b"IEND\xaeB`\x82"  # the last chunk's name and checksum, the same in every PNG
 _SRGB_GAMMA = 0.45455
-_MOST_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
+_MANY_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
+_MOST_SCANNED = 1_000_000_000  # pixels, which take some seconds
 _UPRIGHT: dict[int, Callable[[NDArray[Any]], NDArray[Any]]] = {
     1: lambda a: a,
     2: lambda a: a[:, ::-1],
@@ -120,9 +121,10 @@ def _decode_jpeg(file: Path) -> DecodedImage:
     from PIL import JpegImagePlugin
 
     data = file.read_bytes()
-    scans = data.count(b"\xff\xda")
-    if scans > _MOST_SCANS:
-        raise BadInput(file, "number of scans", f"{scans}", f"at most {_MOST_SCANS}")
+    size = JpegImagePlugin.JpegImageFile(io.BytesIO(data)).size
+    scans = data.count(b"\xff\xda")  # and some by chance, in a film behind the photograph
+    if scans > _MANY_SCANS and scans * math.prod(size) > _MOST_SCANNED:
+        raise BadInput(file, "number of scans", f"{scans}", f"at most {_MANY_SCANS}")
     image = _load_with_pillow(file, JpegImagePlugin.JpegImageFile, io.BytesIO(data), 4)
     return _turned_upright(file, _eight_bits(file, image), image)
 
