@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import http.client
 import io
+import os
 import socket
 import subprocess
 import sys
@@ -25,6 +26,7 @@ from assets_defs.dagster_metadata import dagster_metadata
 from assets_defs.picture_links import (
     KEEP,
     PictureLinks,
+    forget_pictures,
     note_picture_port,
     picture_folder,
     picture_port,
@@ -117,6 +119,19 @@ def test_the_same_picture_keeps_its_address_and_old_ones_go(tmp_path: Path) -> N
     assert _file_of(workspace, addresses[-1]) in kept
     assert _file_of(workspace, addresses[0]) not in kept
     assert {_file_of(workspace, first), _file_of(workspace, other)} <= kept
+
+
+def test_pictures_go_with_what_they_are_of(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    slots = [Slot("s", "a", name) for name in ("stored", "removed", "being-written")]
+    files = [_file_of(workspace, PictureLinks(workspace, slot).keep("x", NOISE)) for slot in slots]
+    workspace.store.files(slots[0]).version_folder("20260101T000000000000-01234567").mkdir(
+        parents=True
+    )
+    for file in files[:2]:
+        os.utime(file.parent, (1, 1))
+    assert forget_pictures(workspace) == 1
+    assert [file.is_file() for file in files] == [True, False, True]
 
 
 def test_a_full_disk_ends_no_run_for_a_picture(

@@ -80,6 +80,7 @@ def test_frames_show_scratches_and_stay_below_a_uniform_environment(good: Any) -
     assert shown["moving"].shape == (2, 48, 48, 3)
 
 
+@pytest.mark.slow
 def test_the_overview_lays_settings_side_by_side(good: Any) -> None:
     store = good.workspace.store
     good.launcher.launch(Request(SCRATCHES, [{"setting": "mirror"} | PLATE], "test", TINY))

@@ -130,6 +130,7 @@ def test_restored_photographs_are_those_nearest_to_figure_7(good: Any) -> None:
         np.testing.assert_array_equal(restored["original"].values[number], expected)
 
 
+@pytest.mark.slow
 def test_a_second_launch_makes_nothing_and_a_forced_one_gives_the_same(good: Any) -> None:
     store = good.workspace.store
     before = {slot: store.current(slot) for slot in store.slots()}

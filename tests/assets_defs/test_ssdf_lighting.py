@@ -108,6 +108,7 @@ def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:
     assert 18_000 < int(small["bytes_file"]) <= 20_000
 
 
+@pytest.mark.slow
 def test_the_overview_lays_environments_side_by_side(good: Any) -> None:
     for name in ("lamps", "uniform"):
         good.launcher.launch(Request(SSDF, [SCENE | {"environment": name}], "test", TINY))
@@ -161,6 +162,7 @@ def test_a_scene_and_an_environment_of_the_users(make_house: Any) -> None:
     assert np.linalg.norm(mesh["vertices"].values, axis=1).max() <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_a_scene_far_away_and_a_kilometre_wide_sees_the_same(make_house: Any) -> None:
     house = make_house()
     inbox = house.workspace.inbox("ssdf_lighting")

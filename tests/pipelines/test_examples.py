@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
-import os
-import subprocess
-import sys
+import runpy
 from pathlib import Path
+from typing import Any
 
+import matplotlib
+import matplotlib.pyplot as plt
 import pytest
 
 from tests.pipelines.examples import found_examples, run_examples
@@ -43,24 +44,15 @@ def test_a_page_is_short_and_uses_numerics_only(page: Path) -> None:
     assert imported.isdisjoint({"storage", "assets_defs", "tsuya", "dagster"})
 
 
-_RUN = """
-import runpy, sys
-import matplotlib.pyplot as plt
-shown = []
-plt.show = lambda *a, **k: shown.append([axes.images for axes in plt.gcf().axes])
-runpy.run_path(sys.argv[1])
-pictures = [image.get_array() for axes in shown for images in axes for image in images]
-assert pictures, "nothing was shown"
-assert all(picture.std() > 1e-3 for picture in pictures), "an empty picture was shown"
-"""
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_page_shows_a_picture(page: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", _RUN, str(page)],
-        env=os.environ | {"MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
+def test_a_page_shows_a_picture(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    matplotlib.use("agg")
+    shown: list[list[Any]] = []
+    monkeypatch.setattr(
+        plt, "show", lambda *_, **__: shown.append([axes.images for axes in plt.gcf().axes])
     )
-    assert done.returncode == 0, done.stderr
+    runpy.run_path(str(page))
+    pictures = [image.get_array() for axes in shown for images in axes for image in images]
+    plt.close("all")
+    assert pictures, "nothing was shown"
+    assert all(picture.std() > 1e-3 for picture in pictures), "an empty picture was shown"

@@ -123,8 +123,8 @@ def test_sphere_and_floor_agree_with_mitsuba(rendered: tuple[Array, Array]) -> N
 @pytest.mark.parametrize(
     "wrong",
     [
-        MATERIALS._replace(specular=np.array([0.06, 0.0])),
-        MATERIALS._replace(roughness=np.array([0.2, 0.3])),
+        pytest.param(MATERIALS._replace(specular=np.array([0.06, 0.0])), marks=pytest.mark.slow),
+        pytest.param(MATERIALS._replace(roughness=np.array([0.2, 0.3])), marks=pytest.mark.slow),
         MATERIALS._replace(albedo=MATERIALS.albedo * 1.05),
     ],
 )

@@ -217,6 +217,7 @@ def test_pictures_are_bright_rich_and_the_same_again(short: City, photographs: P
     assert road.std() / road.mean() > 0.05
 
 
+@pytest.mark.slow
 def test_panes_look_different_from_another_place_and_walls_do_not(
     photographs: Photographs,
 ) -> None:
