@@ -31,6 +31,7 @@ def named_cases() -> list[Case]:
         *_named_glbs(),
         *_named_drives(),
         *_named_specials(),
+        Case("commas", "profile", "p.csv", {"p.csv": b"," * 1_000_000 + b"\n"}),
         Case("comments", "profile", "p.csv", {"p.csv": b"#\n" * 600_000}),
         Case("token", "profile", "p.csv", {"p.csv": b"v,n\n" + b"1" * 900_000 + b",2\n"}),
     ]
@@ -72,6 +73,7 @@ def _named_meshes() -> list[Case]:
         "rows.ply": PLY.replace("vertex 8", "vertex 900000000000000000"),
         "token.obj": OBJ + "f 1 2 " + "3" * 900_000 + "\n",
         "position.obj": "v 1 2 " + "3" * 900_000 + "\n",
+        "line.obj": corners + "f" + " 1 2 3" * 200_000 + "\n",
         "repeated.obj": corners + "f" + " 1 2 3 4" * 250 + "\n",
         "faces.obj": corners + ("f" + " 1 2 3 4" * 5000 + "\n") * 50,
         "cap.obj": around + "f " + " ".join(map(str, range(1, 801))) + "\n",

@@ -27,6 +27,8 @@ _JPEG_CHANNELS = {1: "grey", 3: "RGB", 4: "CMYK"}
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0 ... SOF15
 _EXR_TYPES = {0: "unsigned", 1: "half", 2: "float"}
 _EXR_NOT_FLAT = 0x800  # deep data
+_LONGEST_HEADER = 8_000_000  # bytes
+_MOST_BLOCKS = 10_000
 _PIXEL_BYTES = 40  # of one photograph while it is decoded
 _REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _CIE_XYZ = (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)
@@ -101,7 +103,7 @@ def header_of(file: Path, data: bytes) -> Header:
 
 def _header(members: Members, name: str) -> Header:
     size = members.size(name)
-    for count in (4096, 1_000_000, size):  # a header with a thumbnail or a profile is longer
+    for count in (4096, 1_000_000, _LONGEST_HEADER):  # with a thumbnail or a profile it is longer
         try:
             return header_of(members.path / name, members.start(name, count))
         except (IndexError, struct.error):
@@ -116,7 +118,9 @@ def _png(data: bytes) -> Header:
         raise IndexError("a PNG begins with its header chunk")
     pixels = f"{depth}-bit {_PNG_CHANNELS.get(colour, 'unknown')}"
     at = 8
+    blocks = 0
     while kind != b"IDAT":
+        blocks = _counted(blocks)
         at += 12 + length
         length, kind = struct.unpack_from(">I4s", data, at)
         if kind == b"tRNS":
@@ -126,7 +130,9 @@ def _png(data: bytes) -> Header:
 
 def _jpeg(data: bytes) -> Header:
     at = 2
+    blocks = 0
     while True:
+        blocks = _counted(blocks)
         if data[at] != 0xFF:
             raise IndexError("a marker is missing")
         marker = data[at + 1]
@@ -150,7 +156,9 @@ def _exr(file: Path, data: bytes) -> Header:
         raise BadInput(file, "pixel format", "deep", "half or float channels")
     attributes: dict[bytes, bytes] = {}
     at = 8
+    blocks = 0
     while data[at]:
+        blocks = _counted(blocks)
         name, at = _exr_text(data, at)
         _, at = _exr_text(data, at)
         (size,) = struct.unpack_from("<I", data, at)
@@ -164,6 +172,13 @@ def _exr(file: Path, data: bytes) -> Header:
     return Header(
         "EXR", max(right - left + 1, 0), max(bottom - top + 1, 0), f"{sample_type} {space}", names
     )
+
+
+def _counted(blocks: int) -> int:
+    """One block of a header more; a file of nothing but empty ones would take for ever."""
+    if blocks == _MOST_BLOCKS:
+        raise IndexError("the header does not end")
+    return blocks + 1
 
 
 def _exr_text(data: bytes, at: int) -> tuple[bytes, int]:

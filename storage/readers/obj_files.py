@@ -18,6 +18,8 @@ from storage.readers.bad_input import BadInput
 from storage.readers.opening import number, whole_file
 from storage.readers.polygons import PolygonMesh
 
+_LONGEST_LINE = 1_000_000
+
 
 class ObjPart(NamedTuple):
     """What polygons have in common: the names that ``o``, ``g`` and ``usemtl`` gave last before
@@ -95,7 +97,10 @@ def _lines(file: Path) -> Iterator[str]:
     joined to the next."""
     text = whole_file(file, "an OBJ mesh").decode("utf-8", errors="replace")
     text = text.replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
-    for line in io.StringIO(text):
+    for row, line in enumerate(io.StringIO(text), start=1):
+        if len(line) > _LONGEST_LINE:
+            found = f"{len(line)} characters long"
+            raise BadInput(file, f"line {row}", found, f"at most {_LONGEST_LINE} characters")
         yield from line.splitlines()
 
 

@@ -6,9 +6,8 @@ Blender writes, and accepts ASCII files that end early (both seen).
 
 from __future__ import annotations
 
-import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.opening import number, whole_file
+from storage.readers.opening import LONGEST_NUMBER, number, whole_file
 from storage.readers.polygons import PolygonMesh
 
 _TYPES = {
@@ -25,6 +24,7 @@ _TYPES = {
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
 _BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_PIECE = 1 << 20  # bytes
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # no standard, three habits
 
 
@@ -141,10 +141,7 @@ class _AsciiBody:
     """Rows of numbers in text; line ends do not matter."""
 
     def __init__(self, data: bytes, start: int) -> None:
-        # Line by line: an array of words has room for the longest in each of its places.
-        lines = io.BytesIO(data[start:])
-        words = (word for line in lines for word in line.split())
-        self._numbers = np.fromiter(map(number, words), np.float64)
+        self._numbers = np.fromiter(map(number, _words(data, start)), np.float64)
         self.at = 0
 
     def take(self, type_: np.dtype[Any], count: int) -> NDArray[np.float64]:
@@ -159,6 +156,21 @@ class _AsciiBody:
         widths = [width for _, width in fields]
         numbers = self.take(np.dtype(np.float64), rows * sum(widths)).reshape(rows, sum(widths))
         return np.split(numbers, np.cumsum(widths)[:-1], axis=1)
+
+
+def _words(data: bytes, start: int) -> Iterator[bytes]:
+    """Words apart by blanks and line ends, split a piece at a time: all together would take thirty
+    times the file. Raises ValueError for a word of a thousand characters."""
+    rest = b""
+    for at in range(start, len(data), _PIECE):
+        piece = rest + data[at : at + _PIECE]
+        words = piece.split()
+        rest = words.pop() if words and not piece[-1:].isspace() else b""
+        if len(rest) > LONGEST_NUMBER:
+            raise ValueError("a word that is no number")
+        yield from words
+    if rest:
+        yield rest
 
 
 class _BinaryBody:

@@ -23,6 +23,7 @@ FEWEST_POINTS = 3
 MOST_POINTS = 100_000
 
 _LARGEST = 64 << 20  # bytes: 600 a point
+_LONGEST_LINE = 100_000
 _MOST_LINES = 5 * MOST_POINTS  # comments and blank lines among them
 
 _EXPECTED = "a CSV file of points v, n in UTF-8"
@@ -131,6 +132,9 @@ def _lines(file: Path) -> Iterator[tuple[int, str]]:
                 if number > _MOST_LINES:
                     expected = f"at most {_MOST_LINES}"
                     raise BadInput(file, "number of lines", f"more than {_MOST_LINES}", expected)
+                if len(line) > _LONGEST_LINE:
+                    found, expected = f"{len(line)} characters", f"at most {_LONGEST_LINE}"
+                    raise BadInput(file, f"length of line {number}", found, expected)
                 if "\0" in line:  # valid UTF-8, but the mark of a binary file or of UTF-16
                     raise BadInput(file, "content", "not text", _EXPECTED)
                 if line.strip():
