@@ -33,7 +33,7 @@ _LOCAL = ("localhost", "127.0.0.1")
 
 
 class _Process(NamedTuple):
-    """A process that no other one is, and the run that it says to execute, if it names one."""
+    """A process that no other one is, and the run that it says to execute, `-` for any."""
 
     host: str
     boot: str
@@ -42,7 +42,7 @@ class _Process(NamedTuple):
     run: str
 
     @classmethod
-    def own(cls, run: str = "") -> Self:
+    def own(cls, run: str = "-") -> Self:
         """This process."""
         pid = Path("/proc/self").readlink().name
         return cls(socket.gethostname(), _boot(), int(pid), _started(int(pid)) or "", run)
@@ -68,8 +68,8 @@ class _Process(NamedTuple):
         return self.boot != _boot() or self.started != _started(self.pid)
 
 
-def process_tags(run: str = "") -> dict[str, str]:
-    """Tags for runs that this process executes; ``run``: the one run that they are for."""
+def process_tags(run: str = "-") -> dict[str, str]:
+    """Tags for runs that this process executes; ``run``: the one that they are for, if one."""
     return {PROCESS: _Process.own(run).tag}
 
 

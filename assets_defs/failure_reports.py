@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import dagster as dg
+from dagster._core.storage.tags import PARENT_RUN_ID_TAG
 
 from assets_defs.partitions import keys_of_partition
 from assets_defs.system import System
@@ -57,9 +58,9 @@ def write_report(
     ``said`` is what the history says where no step of the run does.
     """
     failures = _failures(instance, run)
-    if any(sentence == INTERRUPTED for _, sentence, _ in failures) or _has_failed_child(
-        instance, run
-    ):
+    if any(sentence == INTERRUPTED for _, sentence, _ in failures):
+        return None
+    if _is_told_of(instance, run, failures):
         return None
     folder = workspace.root / "reports"
     folder.mkdir(parents=True, exist_ok=True)
@@ -112,11 +113,15 @@ def _failures(instance: dg.DagsterInstance, run: dg.DagsterRun) -> list[_Failure
     return found
 
 
-def _has_failed_child(instance: dg.DagsterInstance, run: dg.DagsterRun) -> bool:
+def _is_told_of(
+    instance: dg.DagsterInstance, run: dg.DagsterRun, failures: Sequence[_Failure]
+) -> bool:
+    """Whether all that failed are runs that this one launched: each has its own report."""
     children = dg.RunsFilter(
-        tags={"dagster/parent_run_id": run.run_id}, statuses=[dg.DagsterRunStatus.FAILURE]
+        tags={PARENT_RUN_ID_TAG: run.run_id}, statuses=[dg.DagsterRunStatus.FAILURE]
     )
-    return instance.get_runs_count(children) > 0
+    said = sum(len(sentence.splitlines()) for _, sentence, _ in failures)
+    return 0 < said <= instance.get_runs_count(children)
 
 
 def _headline(run: dg.DagsterRun, when: datetime, failures: Sequence[_Failure]) -> Iterator[str]:

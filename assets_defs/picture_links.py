@@ -3,9 +3,10 @@
     <data>/full_size/<system>/<asset>/<partition>/<name>-<hash>.png
 
 A file is called by what it shows, so what shows the same has the same address, also when it is
-made again every night. The newest of each name stay. `tsuya ui` serves the folder on this machine
-only (`assets_defs/picture_server.py`); the port belongs to the data folder, so that a process
-that writes a picture knows its address without asking, and the address stays valid.
+made again every night. The newest of each name stay, for as long as versions of the asset do.
+`tsuya ui` serves the folder on this machine only (`assets_defs/picture_server.py`); the port
+belongs to the data folder, so that a process that writes a picture knows its address without
+asking, and the address stays valid.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import contextlib
 import hashlib
 import io
 import os
+import shutil
+import time
 import uuid
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from assets_defs.workspace import Workspace
 from storage.slugs import slug
-from storage.versions import KEEP_VERSIONS, Slot
+from storage.versions import KEEP_VERSIONS, LEAST_AGE_SECONDS, Slot
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,6 +85,21 @@ class PictureLinks:
             _bound(folder, path)
         address = f"{HOST}:{picture_port(self.workspace)}"
         return f"http://{address}/{inside.as_posix()}/{path.name}"
+
+
+def forget_pictures(workspace: Workspace) -> int:
+    """Delete the pictures of what is stored no more; of how many partitions.
+
+    One that is young may be of a version that is being written.
+    """
+    gone = 0
+    youngest = time.time() - LEAST_AGE_SECONDS
+    for folder in picture_folder(workspace).glob("*/*/*"):
+        slot = Slot(*folder.parts[-3:])
+        if folder.stat().st_mtime < youngest and not workspace.store.versions(slot):
+            shutil.rmtree(folder, ignore_errors=True)
+            gone += 1
+    return gone
 
 
 def _bound(folder: Path, newest: Path) -> None:

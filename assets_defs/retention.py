@@ -16,6 +16,7 @@ import dagster as dg
 from dagster._core.storage.dagster_run import FINISHED_STATUSES
 from dagster._core.storage.event_log import SqliteEventLogStorage
 
+from assets_defs.picture_links import forget_pictures
 from assets_defs.workspace import Workspace
 from storage.versions import Slot, VersionedStore
 
@@ -103,8 +104,8 @@ def retention_sensor(workspace: Workspace, assets: Iterable[dg.AssetKey]) -> dg.
         deleted = delete_old_runs(context.instance, keys)
         if deleted:
             return dg.SkipReason(f"{len(deleted)} old runs deleted.")
-        collected = collect_store(workspace.store)
+        collected = collect_store(workspace.store) + forget_pictures(workspace)
         context.update_cursor(today)
-        return dg.SkipReason(f"No run is old; {collected} pieces of the store collected.")
+        return dg.SkipReason(f"No run is old; {collected} pieces of the data collected.")
 
     return look

@@ -148,18 +148,20 @@ def test_a_failed_check_is_reported_in_its_own_words_and_an_interruption_not_at_
     assert write_report(house.workspace, SYSTEMS, house.instance, run, "said") is None
 
 
-def test_a_run_that_failed_with_those_that_it_launched_adds_no_report(house: Any) -> None:
+def test_a_run_that_failed_with_those_that_it_launched_adds_no_report(
+    house: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*arguments: Any, **options: Any) -> Any:
+        raise ValueError("the photograph has a single luminance.")
+
+    monkeypatch.setattr(attenuation, "fit_attenuation", broken)
     job = house.definitions.get_repository_def().get_job("launch")
-    launched = {"ops": {"launch_graph": {"config": {"system": "photo_fur", "partitions": []}}}}
-    for partitions, is_reported in (([{"photo": "lost"}], True), ([{"photo": "flat"}], False)):
-        partitions = [
-            {"photo": key}
-            for key, source in FUR.sources("photo", house.workspace.inbox("photo_fur")).items()
-            if source.path and not is_reported
-        ] or partitions
-        launched["ops"]["launch_graph"]["config"] |= {"partitions": partitions}
+    for photo, is_reported in (("lost", True), ("grass", False)):
+        fields = {"system": "photo_fur", "partitions": [{"photo": photo}], "force": True}
         done = job.execute_in_process(
-            run_config=launched, instance=house.instance, raise_on_error=False
+            run_config={"ops": {"launch_graph": {"config": fields}}},
+            instance=house.instance,
+            raise_on_error=False,
         )
         assert not done.success
         run = house.instance.get_run_by_id(done.run_id)
