@@ -13,6 +13,7 @@ import time
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from assets_defs.picture_links import HOST
@@ -44,6 +45,9 @@ class PictureServer(ThreadingHTTPServer):
         self.socket = listener
         self.folder = folder
         self.server_activate()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing: a browser went away while it was answered."""
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -36,7 +36,7 @@ from assets_defs.workspace import Workspace
 from storage.versions import Slot
 from tsuya import web_ui
 
-NOISE = np.random.default_rng(5).integers(0, 256, (700, 900, 3), dtype=np.uint8)
+NOISE = np.random.default_rng(5).integers(0, 256, (200, 300, 3), dtype=np.uint8)
 
 
 def _file_of(workspace: Workspace, address: str) -> Path:

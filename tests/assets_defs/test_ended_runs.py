@@ -44,7 +44,8 @@ def _status(instance: dg.DagsterInstance, run_id: str) -> dg.DagsterRunStatus:
     return run.status
 
 
-def _of_dead_process() -> str:
+@pytest.fixture(scope="module")
+def dead() -> str:
     """The tag that a process gave itself before it was killed."""
     code = (
         "from assets_defs.ended_runs import *; import time;"
@@ -58,8 +59,10 @@ def _of_dead_process() -> str:
     return tag
 
 
-def test_a_killed_processes_runs_are_ended_and_say_why(instance: dg.DagsterInstance) -> None:
-    dead, own = _of_dead_process(), process_tags()[PROCESS]
+def test_a_killed_processes_runs_are_ended_and_say_why(
+    instance: dg.DagsterInstance, dead: str
+) -> None:
+    own = process_tags()[PROCESS]
     ended = {
         _run(instance, STARTED, process=dead): dg.DagsterRunStatus.FAILURE,
         _run(instance, dg.DagsterRunStatus.STARTING, process=dead): dg.DagsterRunStatus.FAILURE,
@@ -140,9 +143,11 @@ def test_a_run_that_nobody_knows_is_given_a_day(
     assert run_id in end_dead_runs(instance)
 
 
-def test_the_process_that_executes_tags_its_run_once(instance: dg.DagsterInstance) -> None:
+def test_the_process_that_executes_tags_its_run_once(
+    instance: dg.DagsterInstance, dead: str
+) -> None:
     """A run executed again in the web UI has the tags of the first one's dead process."""
-    run_id = _run(instance, STARTED, process=_of_dead_process())
+    run_id = _run(instance, STARTED, process=dead)
     run = instance.get_run_by_id(run_id)
     assert run is not None
     tag_run(instance, run)
@@ -175,10 +180,10 @@ def test_tags_that_were_copied_from_another_run_say_nothing() -> None:
     assert ended_runs._why_dead(Record) is not None  # type: ignore[arg-type]
 
 
-def test_the_sensor_runs_by_itself_and_ends_them(instance: dg.DagsterInstance) -> None:
+def test_the_sensor_runs_by_itself_and_ends_them(instance: dg.DagsterInstance, dead: str) -> None:
     sensor = ended_runs_sensor()
     assert sensor.default_status == dg.DefaultSensorStatus.RUNNING
-    run_id = _run(instance, STARTED, process=_of_dead_process())
+    run_id = _run(instance, STARTED, process=dead)
     sensor.evaluate_tick(dg.build_sensor_context(instance=instance))
     assert _status(instance, run_id) == dg.DagsterRunStatus.FAILURE
 
