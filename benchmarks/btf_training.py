@@ -72,5 +72,5 @@ def training_speedup(
         "fast_rmse": reached,
         "fast_steps": steps,
         "fast_seconds": seconds,
-        "traintraining_speedup": PAPER_SECONDS / seconds if reached <= wanted else None,
+        "train_speedup": PAPER_SECONDS / seconds if reached <= wanted else None,
     }

@@ -24,7 +24,11 @@ from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
-from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
+from pipelines.photo_fur.figures import (
+    depth_rank_correlation,
+    estimated_depth,
+    top_view_rmse,
+)
 from pipelines.photo_fur.frames import (
     BACKGROUND,
     SQUARE_VIEWS,
@@ -73,33 +77,56 @@ def _photograph(name: str) -> FurPhotograph:
 
 
 def _top_view() -> dict[str, Any]:
-    """Worst of the photographs; tails in the end layers, one texel a pixel, nearest, unlit."""
-    errors = {}
+    """Worst of the photographs; tails in the end layers, one texel a pixel, nearest, unlit.
+
+    The null has the depths of another photograph: its pixels' luminance is shuffled. From above
+    each pixel shows its own colour at whatever depth, so this figure tests the drawing only.
+    """
+    errors, nulls = {}, {}
     for name in ("grass", "chelsea"):
         photo = _photograph(name)
-        mesh = make_shell_mesh(shapes.square(32), 8, thickness=0.05)
-        height, width = photo.luminance.shape
-        drawn = draw_frames(
-            photo,
-            stretched_to_photograph(mesh, photo),
-            SQUARE_VIEWS[:1],
-            size=(height, width),
-            supersampling=1,
-            tails="end layers",
-            fill="columns",
+        errors[name] = _from_above(photo)
+        shuffled = np.random.default_rng(0).permutation(photo.luminance.ravel())
+        nulls[name] = _from_above(
+            photo._replace(luminance=shuffled.reshape(photo.luminance.shape)),
         )
-        errors[name] = top_view_rmse(drawn.pictures[0], photo.radiance)
-    return {"top_view_rmse": max(errors.values()), "top_view_rmse_each": errors}
+    return {
+        "top_view_rmse": max(errors.values()),
+        "top_view_rmse_each": errors,
+        "top_view_rmse_null": max(nulls.values()),
+    }
+
+
+def _from_above(photo: FurPhotograph) -> float:
+    mesh = make_shell_mesh(shapes.square(32), 8, thickness=0.05)
+    height, width = photo.luminance.shape
+    drawn = draw_frames(
+        photo,
+        stretched_to_photograph(mesh, photo),
+        SQUARE_VIEWS[:1],
+        size=(height, width),
+        supersampling=1,
+        tails="end layers",
+        fill="columns",
+    )
+    return top_view_rmse(drawn.pictures[0], photo.radiance)
 
 
 def _depth() -> dict[str, Any]:
-    correlations = []
+    """Of darkness the order, and of Eq. 1's depths the error, beside the best constant depth's."""
+    correlations, errors, constants = [], [], []
     for seed in SEEDS:
         pelt = make_pelt(PELT["size"], PELT["hairs"], PELT["samples"], seed)
-        correlations.append(depth_rank_correlation(luminance(pelt.radiance), pelt.depth))
+        grey = luminance(pelt.radiance)
+        correlations.append(depth_rank_correlation(grey, pelt.depth))
+        found = estimated_depth(grey, fit_attenuation(grey, tail=TAIL))
+        errors.append(float(np.sqrt(np.mean((found - pelt.depth) ** 2))))
+        constants.append(float(pelt.depth.std()))
     return {
         "depth_rank_correlation": statistics.mean(correlations),
         "depth_rank_correlation_seeds": correlations,
+        "depth_rmse": statistics.mean(errors),
+        "depth_rmse_constant": statistics.mean(constants),
     }
 
 

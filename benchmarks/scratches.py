@@ -45,7 +45,16 @@ RENDER_SIZE, RENDER_SAMPLES = 512, 64
 def run() -> dict[str, Any]:
     """All figures; docs/scratches.md says what each one means."""
     figures: dict[str, Any] = {}
-    for part in (_laws, _paths_against_exact, _table_speed, _interpolation, _sampling, _rendering):
+    parts = (
+        _laws,
+        _paths_against_exact,
+        _table_speed,
+        _interpolation,
+        _sampling,
+        _without_the_table,
+        _rendering,
+    )
+    for part in parts:
         figures |= part()
     from tests.reference.groove import reference_figures
 
@@ -169,6 +178,38 @@ def _sampling() -> dict[str, float]:
         "sampling_variance_ratio_equal_paths": float(one / other),
         "sampling_mean_importance": float(guided[:, seen].mean()),
         "sampling_mean_uniform": float(even[:, seen].mean()),
+    }
+
+
+def _without_the_table() -> dict[str, float]:
+    """How much of a picture the table makes: the same paths with a table that reflects nothing.
+
+    What a scratch lets through, 1 - F, does not depend on the table.
+    """
+    glass = _setting_2()
+    surface = glass.surface
+    lobe = surface.lobe
+    dark = lobe._replace(rho=np.zeros_like(lobe.rho), share=np.zeros_like(lobe.share))
+    light = make_environment_sampler(sky(256, sun_azimuth=-115.0, sun_elevation=38.0))
+    full, null = (
+        trace_picture(
+            glass.solid,
+            one,
+            light,
+            object_cameras(glass.solid)[1],
+            width=VARIANCE_SIZE,
+            height=VARIANCE_SIZE,
+            samples=4 * VARIANCE_SAMPLES,
+        )
+        for one in (surface, surface._replace(lobe=dark))
+    )
+    shown, lost = full.radiance.mean(axis=2), (full.radiance - null.radiance).mean(axis=2)
+    seen = full.scratched > 0.5
+    return {
+        "transmitted_share": 1.0 - surface.mean_fresnel,
+        "table_null_change": float(np.sqrt(np.mean(lost**2)) / shown.mean()),
+        "table_null_loss": float(lost.sum() / shown.sum()),
+        "table_null_loss_at_scratches": float(lost[seen].sum() / shown[seen].sum()),
     }
 
 

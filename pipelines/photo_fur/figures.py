@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
-from pipelines.photo_fur.attenuation import Tails
+from pipelines.photo_fur.attenuation import Attenuation, Tails
 
 
 def contrast(luminance: NDArray[np.floating]) -> float:
@@ -36,6 +36,14 @@ def depth_rank_correlation(luminance: NDArray[np.floating], depth: NDArray[np.fl
     from scipy.stats import spearmanr
 
     return float(spearmanr(-luminance.ravel(), depth.ravel()).statistic)
+
+
+def estimated_depth(
+    luminance: NDArray[np.floating], attenuation: Attenuation
+) -> NDArray[np.float64]:
+    """Depth by Eq. 1 as a fraction of the thickness: 0 at Imax and above, 1 at Imin and below."""
+    inside = np.clip(luminance, attenuation.darkest, attenuation.brightest)
+    return np.log(attenuation.brightest / inside) / attenuation.coefficient
 
 
 def partition_error(layer: NDArray[np.uint8], masks: NDArray[np.bool_]) -> float:

@@ -16,6 +16,7 @@ from pipelines.photo_fur.figures import (
     contrast,
     decay_error,
     depth_rank_correlation,
+    estimated_depth,
     interval_error,
     kept_share,
     mean_brightness,
@@ -55,6 +56,13 @@ def test_decay_error_is_the_largest_relative_step_from_equation_1() -> None:
     boundaries[5] *= 0.9
     found = decay_error(boundaries, MEDIUM.brightest, MEDIUM.coefficient)
     assert found == pytest.approx(0.25)
+
+
+def test_the_estimated_depth_inverts_equation_1_and_ends_at_the_extremes() -> None:
+    depth = np.linspace(0.0, 1.0, 12).reshape(3, 4)
+    assert estimated_depth(MEDIUM.luminance_at(depth), MEDIUM) == pytest.approx(depth)
+    beyond = np.array([[0.0, MEDIUM.darkest / 2, 1.0]])
+    assert estimated_depth(beyond, MEDIUM).tolist() == [[1.0, 1.0, 0.0]]
 
 
 def brute_force_ranks(values: list[float]) -> list[float]:

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.bad_input_cases import named_cases
 from benchmarks.bad_input_files import Case, valid_cases
-from benchmarks.bad_inputs import READERS, judged, report, written
+from benchmarks.bad_inputs import READERS, case_of, judged, report, written
 from storage.readers import BadInput
 from storage.readers.bad_input import MOST_QUOTED
 
@@ -41,6 +41,16 @@ def test_what_once_broke_a_reader(tmp_path: Path, case: Case) -> None:
 @pytest.mark.parametrize("case", valid_cases(), ids=lambda case: f"{case.reader}-{case.name}")
 def test_the_files_that_are_made_wrong_were_right(tmp_path: Path, case: Case) -> None:
     READERS[case.reader](written(case, tmp_path / "in"))
+
+
+def test_equal_seeds_make_equal_files_and_others_do_not() -> None:
+    valid = valid_cases()
+    inputs = [[case_of(row, seed, [], valid) for row in range(300)] for seed in (1, 1, 2)]
+    assert inputs[0] == inputs[1]
+    same = [one == other for one, other in zip(inputs[0], inputs[2], strict=True)]
+    assert sum(same) < 30
+    assert {case.reader for case in inputs[0]} == set(READERS) - {"script"}
+    assert sum(case in valid for case in inputs[0]) < 30  # hardly any is left as it was
 
 
 def script(name: str, text: str) -> Case:
