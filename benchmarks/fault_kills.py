@@ -178,7 +178,7 @@ def _start(command: list[str], environment: dict[str, str]) -> subprocess.Popen[
         "stdout": subprocess.DEVNULL,
         "stderr": subprocess.DEVNULL,
     }
-    return subprocess.Popen(command, env={**os.environ, **environment}, **quiet)  # type: ignore[call-overload, no-any-return]
+    return subprocess.Popen(command, env={**os.environ, **environment}, **quiet)  # type: ignore[call-overload]
 
 
 def _finish(command: list[str], environment: dict[str, str]) -> str:

@@ -68,9 +68,9 @@ class ZarrIOManager(dg.IOManager):
         try:
             return self.store.open(_slot(context))
         except DamagedError as error:
-            raise damage_failure(self.store, error) from error
-        except StoreError as error:
-            raise dg.Failure(description=str(error), allow_retries=False) from error
+            raise damage_failure(self.store, error) from None
+        except StoreError as error:  # a sentence; its trace says nothing more
+            raise dg.Failure(description=str(error), allow_retries=False) from None
 
 
 def damage_failure(store: VersionedStore, damage: DamagedError) -> dg.Failure:

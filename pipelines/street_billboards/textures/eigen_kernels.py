@@ -250,7 +250,7 @@ def code_billboards(
         channels = colour_channels(data.colours[begin:end], data.luma_chroma)
         guess_gaps(channels, counted)
         for c in (2, 1, 0):
-            rank = np.int64(arrays.ranks[b, c])  # as `rank_errors` has it: compiled once
+            rank = int(np.int64(arrays.ranks[b, c]))  # as `rank_errors` has it: compiled once
             start = start_planes(channels[c], counted, rank, sides[c])
             factors, _ = fit_planes(channels[c], counted, start, rank, sides[c], ridge, sweeps)
             mass = counted

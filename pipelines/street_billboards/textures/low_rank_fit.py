@@ -22,15 +22,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.textures.vector_sums import dot, matrix_product, total_of
+
 FloatArray = NDArray[np.float32]
 
 RIDGE = 0.05
 """Codes², of images."""
 _PULL = 0.5
-_LANES = 16
-"""Sums side by side, which a processor adds in one go. With leave to reorder (fastmath), a kernel
-that was compiled in this process and the same one from numba's cache gave different last bits, so
-the same street was stored twice."""
 _START_SWEEPS = 3
 
 
@@ -104,7 +102,7 @@ def truncated_svd(values: FloatArray, counted: FloatArray, rank: int) -> Factors
         for p in range(texels):
             filled[i, p] = values[i, p] - means[i] if counted[i, p] > 0.0 else middle[p]
     for i in range(views):
-        own = _total(filled[i]) / np.float32(texels)
+        own = total_of(filled[i]) / np.float32(texels)
         for p in range(texels):
             filled[i, p] -= own
         means[i] += own
@@ -138,7 +136,7 @@ def _centre(values: FloatArray, counted: FloatArray, middle: FloatArray, means: 
     for i in range(views):
         for p in range(texels):
             off[p] = values[i, p] - middle[p]
-        mass, moment = _total(counted[i]), dot(counted[i], off)
+        mass, moment = total_of(counted[i]), dot(counted[i], off)
         if mass > 0.0:
             means[i] = moment / mass
             mean += means[i]
@@ -148,28 +146,6 @@ def _centre(values: FloatArray, counted: FloatArray, middle: FloatArray, means: 
     for i in range(views):
         if not (counted[i] > 0.0).any():
             means[i] = mean / known if known else np.float32(0.0)
-
-
-@njit(cache=True, nogil=True)
-def dot(one: FloatArray, other: FloatArray) -> np.float32:
-    """Sum of products of two vectors (P,), added up in a fixed order."""
-    sums = np.zeros(_LANES, np.float32)
-    whole = len(one) // _LANES * _LANES
-    for p in range(0, whole, _LANES):
-        for lane in range(_LANES):
-            sums[lane] += one[p + lane] * other[p + lane]
-    total = np.float32(0.0)
-    for lane in range(_LANES):
-        total += sums[lane]
-    for p in range(whole, len(one)):
-        total += one[p] * other[p]
-    return total
-
-
-@njit(cache=True, nogil=True)
-def _total(values: FloatArray) -> np.float32:
-    """Sum of a vector (P,), in the same order."""
-    return dot(values, np.ones(len(values), np.float32))
 
 
 @njit(cache=True, nogil=True)
@@ -295,7 +271,7 @@ def solve_weights(
     for i in range(views):
         for p in range(texels):
             off[p] = values[i, p] - means[i]
-        mass, moment = _total(counted[i]), dot(counted[i], off)
+        mass, moment = total_of(counted[i]), dot(counted[i], off)
         if mass <= 0.0:
             empty[i] = True
             for k in range(rank):
@@ -304,7 +280,7 @@ def solve_weights(
         for k in range(rank):
             for p in range(texels):
                 weighted[p] = images[k, p] * counted[i, p]
-            matrix[rank, k] = matrix[k, rank] = _total(weighted)
+            matrix[rank, k] = matrix[k, rank] = total_of(weighted)
             right[k] = dot(weighted, off) + pull[k] * centre[k]
             for m in range(k + 1):
                 matrix[k, m] = matrix[m, k] = dot(weighted, images[m])
@@ -337,7 +313,7 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             if counted[i, p] > 0.0:
                 known[p] = 1.0
     for k in range(rank):
-        middle = dot(images[k], known) / max(_total(known), np.float32(1.0))
+        middle = dot(images[k], known) / max(total_of(known), np.float32(1.0))
         for p in range(texels):
             images[k, p] -= middle * known[p]
         for i in range(views):
@@ -355,9 +331,9 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             root[m, k] = turned[m, k] * size
             back[k, m] = turned[m, k] / size if size > 1e-6 else 0.0
     # weights @ images = (weights @ root) @ (back @ images); the rows of the latter are orthonormal.
-    scaled = _product(weights.astype(np.float64), root)
+    scaled = matrix_product(weights.astype(np.float64), root)
     left, lengths, right = np.linalg.svd(scaled, full_matrices=False)
-    turn = _product(right, back)
+    turn = matrix_product(right, back)
     new = np.zeros((len(turn), texels), np.float32)
     for k in range(len(turn)):
         for m in range(rank):
@@ -372,17 +348,6 @@ def _orthogonalise(counted: FloatArray, factors: Factors) -> None:
             images[k, p] = new[k, p] * size
         for i in range(views):
             weights[i, k] = left[i, k] * lengths[k] / size
-
-
-@njit(cache=True, nogil=True)
-def _product(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product of two small matrices: numba takes seconds to compile its own, for the messages."""
-    product = np.zeros((one.shape[0], other.shape[1]), np.float64)
-    for i in range(one.shape[0]):
-        for j in range(other.shape[1]):
-            for k in range(one.shape[1]):
-                product[i, j] += one[i, k] * other[k, j]
-    return product
 
 
 @njit(cache=True, nogil=True)

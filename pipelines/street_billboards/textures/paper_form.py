@@ -23,12 +23,12 @@ from pipelines.street_billboards.textures.low_rank_fit import (
     Factors,
     FloatArray,
     alternate_least_squares,
-    dot,
     truncated_svd,
 )
 from pipelines.street_billboards.textures.masks import opacity_masks
 from pipelines.street_billboards.textures.plane_resolution import fill_unknown
 from pipelines.street_billboards.textures.texture_tables import SIDE, ViewTextures
+from pipelines.street_billboards.textures.vector_sums import dot
 from pipelines.street_billboards.textures.view_directions import DIRECTIONS
 
 _SWEEPS = 10
