@@ -51,7 +51,7 @@ def travel_name(file: Path, companion: Path) -> str:
 
 def _referred(file: Path, ending: str) -> list[Path]:
     """The files that a file itself names and that are there."""
-    if ending not in (".obj", ".mtl", ".ply"):
+    if ending not in (".obj", ".mtl", ".ply") or not os.path.isfile(file):  # a pipe would block
         return []
     try:
         status = file.stat()

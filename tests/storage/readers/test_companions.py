@@ -116,3 +116,8 @@ def test_a_ply_names_its_texture(tmp_path: Path) -> None:
 def test_a_file_is_not_its_own_companion_and_other_formats_have_none(tmp_path: Path) -> None:
     assert companions(_write(tmp_path / "a.obj", "mtllib a.obj\n")) == []
     assert companions(_write(tmp_path / "a.glb", "mtllib a.obj\n")) == []
+
+
+def test_a_pipe_refers_to_nothing(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.obj")
+    assert companions(tmp_path / "pipe.obj") == []
