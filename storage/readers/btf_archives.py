@@ -175,7 +175,7 @@ class FolderMembers:
         """Paths inside, sorted; linked folders are not followed."""
         found = [
             (Path(folder) / file).relative_to(self.path).as_posix()
-            for folder, _, files in os.walk(self.path)
+            for folder, _, files in os.walk(self.path, followlinks=True)
             for file in files
         ]
         return sorted(found)

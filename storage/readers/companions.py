@@ -93,16 +93,17 @@ def _lines_with(data: bytes, word: bytes) -> Iterator[str]:
 def _located(file: Path, words: tuple[str, ...], *, several: bool) -> list[Path]:
     """The files that a line names: one whose name may have spaces; else ``several``, apart by
     spaces, or one behind options (``-s 1 1 1``)."""
-    whole = _beside(file, " ".join(words))
+    whole = file_beside(file, " ".join(words))
     if whole is not None:
         return [whole]
     if several:
-        return [there for word in words if (there := _beside(file, word)) is not None]
-    tails = (_beside(file, " ".join(words[start:])) for start in range(1, len(words)))
+        return [there for word in words if (there := file_beside(file, word)) is not None]
+    tails = (file_beside(file, " ".join(words[start:])) for start in range(1, len(words)))
     return [there for there in tails if there is not None][:1]
 
 
-def _beside(file: Path, name: str) -> Path | None:
+def file_beside(file: Path, name: str) -> Path | None:
+    """Where a reference leads: from the file's folder, or to a file beside it."""
     relative = name.replace("\\", "/")
     for candidate in (relative, relative.rpartition("/")[2]):
         there = os.path.normpath(file.parent / candidate)

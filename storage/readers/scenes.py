@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os.path
 from collections.abc import Hashable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
+from storage.readers.companions import file_beside
 from storage.readers.glb_files import GlbFile, read_glb
 from storage.readers.meshes import check_polygons, mesh_format, split_by_uv
 from storage.readers.obj_files import ObjFile, read_obj
@@ -236,23 +236,14 @@ def _obj_materials(file: Path, obj: ObjFile) -> tuple[NDArray[np.int64], list[Ma
 def _libraries(file: Path, line: str) -> tuple[list[Path], list[str]]:
     """The libraries that an ``mtllib`` line names (one, whose name may have spaces, or several
     apart by spaces), and the names of those that are not there."""
-    whole = _library(file, line)
+    whole = file_beside(file, line)
     if whole is not None:
         return [whole], []
-    found = [(name, _library(file, name)) for name in line.split()]
+    found = [(name, file_beside(file, name)) for name in line.split()]
     there = [library for _, library in found if library is not None]
     if not there:
         return [], [line]
     return there, [name for name, library in found if library is None]
-
-
-def _library(file: Path, name: str) -> Path | None:
-    """Where the OBJ says, from its folder, or beside it: files travel without their folders."""
-    relative = name.replace("\\", "/")
-    for candidate in (file.parent / relative, file.parent / relative.rpartition("/")[2]):
-        if os.path.isfile(candidate):  # False, unlike Path's, for names too long to be one
-            return candidate
-    return None
 
 
 def _read_library(file: Path) -> dict[str, Material]:
