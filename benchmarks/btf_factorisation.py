@@ -84,7 +84,7 @@ def against_factorisation(
 ) -> dict[str, Any]:
     """Both in half floats, the factorisation with the largest rank that is not larger.
 
-    ``rival_bytes`` of ``allowed_bytes``: one more rank would not fit. A rank of 0 is the mean alone.
+    ``rival_bytes`` of ``allowed_bytes``: one more rank would not fit. Rank 0 is the mean alone.
     """
     budget = 2 * (sum(values.size for values in stored.decoder.values()) + stored.latents.size)
     ours = btf_rmse(_halved(stored), abrdfs, pairs)

@@ -187,6 +187,8 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
         "bc1_bytes_per_billboard": rivals["bc1"][1] / len(turns),
         "bc7_psnr": rivals["bc7"][0],
         "bc7_bytes_per_billboard": rivals["bc7"][1] / len(turns),
+        "bc_ours_psnr": default["psnr"],
+        "bc_ours_bytes_per_billboard": default["bytes"],
         "bc_rival": default.get("rival"),
         "bc_bytes_ratio": default.get("ratio"),
         "bc_curve": curve,
@@ -221,6 +223,7 @@ def _pole_squares(stored: Stored) -> list[NDArray[np.float64]]:
 
 
 def _held_out(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
+    """Pictures against what was held out: where billboards are, unless a key says whole frame."""
     shown, drive = stored("street_frames"), stored("drive_frames")
     truth, covered = shown["truth"].values, shown["covered"].values
     solid = np.isfinite(drive["truth_depth"].values)
@@ -248,6 +251,7 @@ def _held_out(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
     return {
         "held_out_psnr": float(shown["psnr"].mean()),
         "held_out_psnr_least": float(shown["psnr"].min()),
+        "held_out_psnr_whole_frame": figures.mean_psnr(rendered, truth, np.ones_like(covered)),
         "held_out_ssim": float(shown["ssim"].mean()),
         "held_out_flip": float(shown["flip"].mean()),
         "coverage": float(covered.mean()),
@@ -256,6 +260,7 @@ def _held_out(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
         "points_gain_db": float(np.mean(ours) - np.mean(theirs)),
         "points_gain_db_least": float(np.min(np.array(ours) - theirs)),
         "points": drawn.number,
+        "points_bytes_share": drawn.number * POINT_BYTES / found["bytes_all"],
         "points_coverage": float(drawn.covered.mean()),
         "_pole": _pole_squares(stored),
     }
@@ -265,6 +270,7 @@ def _plain(folder: Path, stored: Stored, found: dict[str, Any]) -> dict[str, Any
     """The same street with textures from the best photograph, whatever stands before it."""
     launch(folder, {"sampling": "plain"}, None)
     aware, plain = found["_pole"], _pole_squares(stored)
+    plain_frames = stored("street_frames")
     gains = [
         figures.psnr_of_squared_errors(mine) - figures.psnr_of_squared_errors(theirs)
         for mine, theirs in zip(aware, plain, strict=True)
@@ -274,7 +280,12 @@ def _plain(folder: Path, stored: Stored, found: dict[str, Any]) -> dict[str, Any
         "occlusion_gain_db": figures.psnr_of_squared_errors(np.concatenate(aware))
         - figures.psnr_of_squared_errors(np.concatenate(plain)),
         "occlusion_gain_db_by_frame": gains,
-        "plain_held_out_psnr": float(stored("street_frames")["psnr"].mean()),
+        "plain_held_out_psnr": float(plain_frames["psnr"].mean()),
+        "plain_held_out_psnr_whole_frame": figures.mean_psnr(
+            plain_frames["rendered"].values,
+            plain_frames["truth"].values,
+            np.ones(plain_frames["covered"].shape, bool),
+        ),
     }
 
 
