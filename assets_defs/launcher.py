@@ -16,6 +16,7 @@ import dagster as dg
 from assets_defs.partitions import partition_key
 from assets_defs.provenance import provenance
 from assets_defs.settings import Settings, resolve
+from assets_defs.sources import Source
 from assets_defs.system import AssetPlan, System
 from assets_defs.workspace import Workspace
 from storage.errors import DamagedError
@@ -272,6 +273,25 @@ def check_settings(system: System, preset: str | None, given: Mapping[str, Any])
     for plan in system.plans.values():
         chosen = _for_plan(plan, given)
         resolve(plan.settings, plan.name, defaults, preset=preset, given=chosen, current=None)
+
+
+def ask_before_work(
+    system: System, sources: Mapping[str, Source], preset: str | None, given: Mapping[str, Any]
+) -> None:
+    """Raise ValueError where items, by dimension, of which one is new cannot go together."""
+    chosen = {
+        plan.name: resolve(
+            plan.settings,
+            plan.name,
+            {name: sources[name].key for name in plan.by},
+            preset=preset,
+            given=_for_plan(plan, given),
+            current=None,
+        )
+        for plan in system.plans.values()
+    }
+    for ask in system.asked_before_work:
+        ask(sources, chosen)
 
 
 def _for_plan(plan: AssetPlan, given: Mapping[str, Any]) -> dict[str, Any]:

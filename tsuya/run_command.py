@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from assets_defs.settings import PRESETS
+from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
+from storage.readers.bad_input import shortened
 from tsuya.console import says_errors
 from tsuya.settings_table import setting_rows
 
@@ -83,17 +87,29 @@ def _launch(
     force: bool,
     as_json: bool,
 ) -> None:
-    from assets_defs.launcher import Request, check_settings
+    from assets_defs.launcher import Request, ask_before_work, check_settings
     from tsuya.gallery import write_overviews, write_pictures
     from tsuya.session import launch_all, open_session, report
 
     with open_session() as session:
         given = _fields(settings)
         check_settings(system, preset, given)  # before a file is copied
+        found = {
+            dimension.name: [
+                _source(item, system, dimension, session)
+                for item in items[dimension.name] or dimension.examples
+            ]
+            for dimension in system.dimensions
+        }
+        inbox = session.workspace.inbox(system.name)
+        known = {key for name in found for key in system.sources(name, inbox)}
+        for sources in itertools.product(*found.values()):
+            # Before a file is copied. What is known has settings of its own; the launch asks it.
+            if any(source.path and source.key not in known for source in sources):
+                ask_before_work(system, dict(zip(found, sources, strict=True)), preset, given)
         chosen = {
             dimension.name: [
-                _key(item, system, dimension, given, session)
-                for item in items[dimension.name] or dimension.examples
+                _key(source, system, dimension, given, session) for source in found[dimension.name]
             ]
             for dimension in system.dimensions
         }
@@ -144,20 +160,34 @@ def _what_may_be_given(dimension: Dimension) -> str:
     return f"{file}{', '.join(dimension.builtin)}{', a number' if dimension.numbers else ''}"
 
 
-def _key(
-    item: str, system: System, dimension: Dimension, given: Mapping[str, Any], session: Session
-) -> str:
-    """The key of a built-in or registered item; a file is taken into the inbox."""
-    from assets_defs.inbox import take_in
-
-    known = system.sources(dimension.name, session.workspace.inbox(system.name))
+def _source(item: str, system: System, dimension: Dimension, session: Session) -> Source:
+    """A built-in or registered item, or a file that is not in the inbox yet."""
+    inbox = session.workspace.inbox(system.name)
+    known = system.sources(dimension.name, inbox)
     if item in known or not (dimension.suffixes or dimension.folders):
-        return system.source(dimension.name, item, session.workspace.inbox(system.name)).key
-    if not Path(item).exists():
+        return system.source(dimension.name, item, inbox)
+    if not os.path.exists(item):  # False, unlike Path's, for names too long to be one
         raise ValueError(
-            f"{item}: no such {dimension.name}; expected a file or one of {', '.join(known)}."
+            f"{shortened(item)}: no such {dimension.name}; expected a file or one of "
+            f"{', '.join(known)}."
         )
-    return take_in(Path(item), system, dimension, given, session.workspace, session.instance)
+    return Source.of(Path(item))
+
+
+def _key(
+    source: Source,
+    system: System,
+    dimension: Dimension,
+    given: Mapping[str, Any],
+    session: Session,
+) -> str:
+    """The key of an item; a file is taken into the inbox."""
+    from assets_defs.taking_in import take_in
+
+    inbox = session.workspace.inbox(system.name)
+    if source.path is None or source.path.is_relative_to(inbox):
+        return source.key
+    return take_in(source.path, system, dimension, given, session.workspace, session.instance)
 
 
 def _fields(settings: Sequence[str]) -> Mapping[str, Any]:
