@@ -360,7 +360,7 @@ def test_a_state_is_of_one_recipe(good: Any, monkeypatch: pytest.MonkeyPatch) ->
         patch.setattr(training.Trainer, "step", killed)
         assert not _materialise(good, "neural_btf", CLUSTERED, network_seed=7).success
     assert _tries_again(good) == 0
-    (state,) = work.glob("*.state")
+    assert len(list(work.glob("*.state"))) == 1
     assert store.pointer(slot) == before
     restored: list[bytes] = []
     monkeypatch.setattr(training.Trainer, "restore", lambda self, kept: restored.append(kept))
