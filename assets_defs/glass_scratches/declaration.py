@@ -81,7 +81,7 @@ SCRATCHES = System(
         Dimension(
             "setting",
             builtin=SETTINGS,
-            examples=("setting-2", "mirror", "worn"),
+            examples=("setting-2", "worn"),
             default="setting-2",
             suffixes=(".csv",),
             check=_check_profile,
