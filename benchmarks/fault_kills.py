@@ -11,11 +11,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+import dagster as dg
 import numpy as np
 
+from assets_defs.ended_runs import end_dead_runs
 from storage import zarr_files
 from storage.errors import NoVersionError
 from storage.versions import Slot, VersionedStore
+from tsuya.history import open_history
 
 _TSUYA = str(Path(sys.executable).with_name("tsuya"))
 _SLOT = Slot("photo_fur", "fur_photo", "killed")
@@ -90,7 +93,7 @@ def kill_commands(count: int, environment: dict[str, str], seed: int) -> dict[st
         process.kill()
         process.wait()
         losses += _lost(store, before)
-        blocked += _at_work(environment) > 0
+        blocked += _at_work() > 0
     return {"kills": count, "losses": losses, "blocked_queues": blocked}
 
 
@@ -119,9 +122,19 @@ def kill_daemon_runs(count: int, environment: dict[str, str], seed: int) -> dict
                 os.kill(int(said[1]), signal.SIGKILL)
                 losses += _lost(store, before)
     finally:
-        ui.send_signal(signal.SIGINT)
-        ui.wait(60)
+        _end_session(ui)
     return {"kills": len(known) - 1, "losses": losses, "blocked_queues": blocked}
+
+
+def _end_session(process: subprocess.Popen[bytes]) -> None:
+    """Ctrl-C, which a terminal sends to all processes of a session; then by force."""
+    for number, seconds in ((signal.SIGINT, 30.0), (signal.SIGKILL, 10.0)):
+        os.killpg(process.pid, number)
+        try:
+            process.wait(seconds)
+            return
+        except subprocess.TimeoutExpired:
+            continue
 
 
 def _drop_photograph(inbox: Path, number: int) -> None:
@@ -143,13 +156,6 @@ def _lost(store: VersionedStore, before: dict[Slot, Any]) -> int:
     return lost
 
 
-_AT_WORK = """
-import dagster as dg
-from tsuya.session import open_session
-with open_session() as session:
-    at_work = [dg.DagsterRunStatus.STARTED, dg.DagsterRunStatus.STARTING]
-    print(len(session.instance.get_run_records(dg.RunsFilter(statuses=at_work))))
-"""
 _WAIT = """
 import sys, time
 import dagster as dg
@@ -168,17 +174,23 @@ with open_history() as instance:
 """
 
 
-def _at_work(environment: dict[str, str]) -> int:
-    return int(_finish([sys.executable, "-c", _AT_WORK], environment).splitlines()[-1])
+def _at_work() -> int:
+    """Runs that Dagster takes for ones at work, after what every command does first."""
+    at_work = [dg.DagsterRunStatus.STARTED, dg.DagsterRunStatus.STARTING]
+    with open_history() as instance:
+        end_dead_runs(instance)
+        return instance.get_runs_count(dg.RunsFilter(statuses=at_work))
 
 
 def _start(command: list[str], environment: dict[str, str]) -> subprocess.Popen[bytes]:
-    quiet = {
-        "stdin": subprocess.DEVNULL,
-        "stdout": subprocess.DEVNULL,
-        "stderr": subprocess.DEVNULL,
-    }
-    return subprocess.Popen(command, env={**os.environ, **environment}, **quiet)  # type: ignore[call-overload]
+    return subprocess.Popen(
+        command,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
 
 
 def _finish(command: list[str], environment: dict[str, str]) -> str:
