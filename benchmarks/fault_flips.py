@@ -74,7 +74,10 @@ def _flip_of_slot(store: VersionedStore, chance: random.Random) -> tuple[bool, b
 def _flip_of_graph(session: Session, chance: random.Random) -> tuple[bool, bool]:
     """One bit of a current version; whoever launches next, forced or not, mends it."""
     store = session.workspace.store
-    slots = [slot for slot in store.slots() if slot != _SLOT and slot.partition != "kept"]
+    slots = [
+        _FUR.slot(plan.name, {name: _KEYS[name] for name in plan.by})
+        for plan in _FUR.plans.values()
+    ]
     before = {slot: store.record(slot)["content"] for slot in slots}
     slot = chance.choice(slots)
     version = store.current(slot)
