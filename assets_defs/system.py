@@ -246,14 +246,14 @@ class System:
     ) -> Settings:
         """An asset's settings for a partition. Raises SettingsError."""
         slot = self.slot(asset, keys)
-        has_current = store.pointer(slot).version is not None
+        pointer = store.pointer(slot)
         return resolve(
             self.plans[asset].settings,
             asset,
             keys,
             preset=preset,
             given=given,
-            current=store.record(slot)["settings"] if has_current else None,
+            current=store.record(slot)["settings"] if pointer.version else pointer.settings,
         )
 
     def source_of(self, plan: AssetPlan, keys: Mapping[str, str], inbox: Path) -> Source | None:

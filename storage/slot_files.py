@@ -12,7 +12,7 @@ import re
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ class Pointer:
     """Good versions before the current one, newest first."""
     candidates: tuple[str, ...] = ()
     """Versions that wait for their checks, oldest first."""
+    settings: Mapping[str, Any] | None = field(default=None, compare=False)
+    """Of the current version; where it was found damaged and none is left, what it had."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class SlotFiles:
         """The pointer that versions and verdicts demand: the newest good version is current."""
         good: list[str] = []
         waiting: list[str] = []
-        recipe = None
+        recipe = settings = None
         for version in self.versions():
             try:
                 record, verdicts = self.record(version), self.verdicts(version)
@@ -108,11 +110,11 @@ class SlotFiles:
                 continue
             if all(check in verdicts for check in record["checks"]):
                 good.append(version)
-                recipe = record["recipe"]
+                recipe, settings = record["recipe"], record["settings"]
             else:
                 waiting.append(version)
         newest = good[-1] if good else None
-        return Pointer(newest, recipe, tuple(reversed(good[:-1])), tuple(waiting))
+        return Pointer(newest, recipe, tuple(reversed(good[:-1])), tuple(waiting), settings)
 
     @contextmanager
     def locked(self) -> Iterator[Pointer]:

@@ -257,6 +257,8 @@ class VersionedStore:
             changed = replace(pointer, candidates=candidates, earlier=earlier)
             if pointer.version == version:
                 changed = self._step_back(slot, changed)
+                if changed.version is None and check != STORED:
+                    changed = replace(changed, settings=None)  # They were rejected with it.
             files.point(changed)
             return changed.version
 
@@ -298,9 +300,9 @@ class VersionedStore:
                 what = error.what if isinstance(error, DamagedError) else str(error)
                 self.files(slot).note(version, STORED, passed=False, figure=None, reason=what)
                 continue
-            recipe = self.record(slot, version)["recipe"]
-            earlier = pointer.earlier[number + 1 :]
-            return replace(pointer, version=version, recipe=recipe, earlier=earlier)
+            record, earlier = self.record(slot, version), pointer.earlier[number + 1 :]
+            now = {"recipe": record["recipe"], "settings": record["settings"]}
+            return replace(pointer, version=version, earlier=earlier, **now)
         return replace(pointer, version=None, recipe=None, earlier=())
 
     def _promoted(self, slot: Slot, pointer: Pointer, version: str) -> Pointer:
@@ -320,7 +322,7 @@ class VersionedStore:
             return replace(pointer, earlier=older, candidates=candidates)
         before = () if pointer.version is None else (pointer.version,)
         earlier = (*before, *pointer.earlier)[: self.keep - 1]
-        return Pointer(version, record["recipe"], earlier, candidates)
+        return Pointer(version, record["recipe"], earlier, candidates, record["settings"])
 
     # ---- collection --------------------------------------------------------------------------
 

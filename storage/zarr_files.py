@@ -9,6 +9,7 @@ What was written before there were checksums is read on.
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import hashlib
 import itertools
@@ -56,12 +57,11 @@ def write_dataset(dataset: xr.Dataset, folder: Path, record: dict[str, Any]) -> 
             prepared[name] = prepared[name].chunk(dict(zip(variable.dims, chunks, strict=True)))
         encoding[str(name)] = {
             "chunks": chunks,
-            "compressors": _codecs(),
             "write_empty_chunks": True,
             "_FillValue": None,
         }
     folder.mkdir(parents=True)
-    store = _stoppable_store()(LocalStore(folder))
+    store = _stoppable_store(folder)(LocalStore(folder))
     try:
         prepared.to_zarr(store, mode="w-", encoding=encoding, zarr_format=3, consolidated=False)
     except OSError as error:
@@ -257,9 +257,22 @@ def _has_checksums(metadata: dict[str, Any]) -> bool:
     return bool(metadata["codecs"][-1]["name"] == _CHECKSUM["name"])
 
 
+def _with_checksums(metadata: dict[str, Any]) -> bytes:
+    """An array's ``zarr.json`` that says that each chunk ends in its checksum."""
+    return json.dumps({**metadata, "codecs": [*metadata["codecs"], _CHECKSUM]}, indent=2).encode()
+
+
 def _without_checksums(metadata: dict[str, Any]) -> bytes:
     """An array's ``zarr.json`` as it was before chunks had checksums."""
     return json.dumps({**metadata, "codecs": metadata["codecs"][:-1]}, indent=2).encode()
+
+
+def _append_checksum(chunk: Path, data: Any) -> None:
+    """Add its checksum to a chunk's file; ``data``: what was written there."""
+    import google_crc32c
+
+    with chunk.open("ab") as file:
+        file.write(google_crc32c.value(data).to_bytes(_CHECKSUM_BYTES, "little"))
 
 
 def _check_chunk(folder: Path, key: str, data: memoryview) -> None:
@@ -270,13 +283,6 @@ def _check_chunk(folder: Path, key: str, data: memoryview) -> None:
     found = int.from_bytes(data[-_CHECKSUM_BYTES:], "little")
     if google_crc32c.value(np.frombuffer(data[:-_CHECKSUM_BYTES], np.uint8)) != found:
         raise DamagedError(folder, f"chunk {key} is damaged: it has not its checksum")
-
-
-def _codecs() -> tuple[Any, ...]:
-    """What a chunk's bytes go through: compressed as Zarr does by default, then a checksum."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    return ZstdCodec(level=0), Crc32cCodec()
 
 
 def _chunk_shape(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
@@ -297,15 +303,16 @@ def _lazy_chunks(variable: Any, planned: tuple[int, ...]) -> tuple[int, ...]:
     return own if large_enough else planned
 
 
-def _stoppable_store() -> Any:
-    """The wrapper class (made on demand: importing zarr takes a second)."""
+def _stoppable_store(folder: Path) -> Any:
+    """The wrapper class of one group (made on demand: importing zarr takes a second)."""
     from zarr.storage import WrapperStore
 
     class StoppableStore(WrapperStore[Any]):
-        """Writes nothing once it is stopped.
+        """Adds the checksums, and writes nothing once it is stopped.
 
-        When one chunk fails, zarr and dask raise at once and go on with other chunks behind the
-        scenes: they would make the folder anew while the caller deletes it.
+        Zarr's own codec would copy every chunk for the four bytes. When one chunk fails, zarr and
+        dask raise at once and go on with other chunks behind the scenes: they would make the folder
+        anew while the caller deletes it.
         """
 
         stopped = False
@@ -317,7 +324,13 @@ def _stoppable_store() -> Any:
             try:
                 if self.stopped:
                     raise StoreError(f"{self._store}: chunk {key} comes after the writing ended.")
+                if key.endswith("/zarr.json"):
+                    metadata = json.loads(value.to_bytes())
+                    value = type(value).from_bytes(_with_checksums(metadata))
                 await self._store.set(key, value)
+                if _CHUNK_KEY.match(key):
+                    data = value.as_numpy_array()
+                    await asyncio.to_thread(_append_checksum, folder / key, data)
             finally:
                 self.at_work -= 1
 

@@ -204,3 +204,17 @@ def test_a_read_only_store_says_so(store: VersionedStore, slot: Slot, two: tuple
             _write(store, Slot("photo_fur", "fur_photo", "other"), 1)
     finally:
         store.root.chmod(0o700)
+
+
+def test_settings_outlive_a_damaged_version_and_not_a_rejected_one(
+    store: VersionedStore, slot: Slot
+) -> None:
+    """Who makes again what was damaged asks for the same."""
+    damaged = _write(store, slot, 7)
+    flip(store.folder(slot, damaged) / "zarr.json", random.Random(5))
+    assert len(list(verify_slot(store, slot))) == 1
+    assert store.pointer(slot).version is None
+    assert store.pointer(slot).settings == {"seed": 7}
+    again = _write(store, slot, 7)
+    store.reject(slot, again, "sharp", "blurred")
+    assert store.pointer(slot).settings is None
