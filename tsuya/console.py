@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,19 @@ INTERRUPTED = "Interrupted: what was made stays; run again to go on."
 
 class SetUpError(Exception):
     """The checkout is not set up, or not as a command needs it."""
+
+
+def dagster_home() -> Path:
+    """The folder of Dagster's history. Raises SetUpError where there is none that can be used."""
+    given = os.environ.get("DAGSTER_HOME")
+    if not given:
+        raise SetUpError("DAGSTER_HOME is not set; expected a folder: run `make setup`.")
+    home = Path(given)
+    if not home.is_absolute():
+        raise SetUpError(f"DAGSTER_HOME is {given!r}; expected an absolute path.")
+    if not home.is_dir():
+        raise SetUpError(f"DAGSTER_HOME is {given!r}; expected a folder: run `make setup`.")
+    return home
 
 
 def says_errors(command: Callable[..., None]) -> Callable[..., None]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import dagster as dg
 import sqlalchemy.exc
 import yaml
 from dagster._core.instance.ref import InstanceRef
 
-from tsuya.console import SetUpError
+from tsuya.console import SetUpError, dagster_home
 
 _NOT_CAPTURED = {
     "compute_logs": {
@@ -22,19 +20,6 @@ _NOT_CAPTURED = {
     }
 }
 """Dagster would take the terminal's file descriptors for its logs: the bars would end in a file."""
-
-
-def dagster_home() -> Path:
-    """The folder of Dagster's history. Raises SetUpError where there is none that can be used."""
-    given = os.environ.get("DAGSTER_HOME")
-    if not given:
-        raise SetUpError("DAGSTER_HOME is not set; expected a folder: run `make setup`.")
-    home = Path(given)
-    if not home.is_absolute():
-        raise SetUpError(f"DAGSTER_HOME is {given!r}; expected an absolute path.")
-    if not home.is_dir():
-        raise SetUpError(f"DAGSTER_HOME is {given!r}; expected a folder: run `make setup`.")
-    return home
 
 
 @contextmanager

@@ -16,7 +16,7 @@ import click
 
 from assets_defs.picture_links import note_picture_port, picture_folder, picture_port
 from assets_defs.workspace import CHECKOUT, Workspace
-from tsuya.console import SetUpError
+from tsuya.console import SetUpError, dagster_home
 
 FIRST_PORT = 3000
 _HOST = "127.0.0.1"
@@ -31,8 +31,7 @@ def serve(port: int | None) -> None:
     """
     workspace = Workspace.of_checkout()
     root = workspace.root
-    if not os.environ.get("DAGSTER_HOME"):
-        raise SetUpError(f"{CHECKOUT}: DAGSTER_HOME is not set; expected `make setup` to be run.")
+    home = dagster_home()
     root.mkdir(parents=True, exist_ok=True)
     with (root / "ui.lock").open("a+") as lock:
         try:
@@ -51,7 +50,7 @@ def serve(port: int | None) -> None:
         # The lock lives as long as the process that this one becomes.
         os.set_inheritable(lock.fileno(), True)
         os.environ["VIRTUAL_ENV"] = sys.prefix  # else dg warns of an environment not activated
-        os.chdir(os.environ["DAGSTER_HOME"])  # a .env beside it would win over the environment
+        os.chdir(home)  # a .env beside it would win over the environment
         program = str(Path(sys.executable).with_name("dg"))
         place = ["--host", _HOST, "--port", address.rpartition(":")[2]]
         loaded = ["--workspace", str(CHECKOUT / "workspace.yaml")]
