@@ -95,7 +95,7 @@ def _flip_of_graph(session: Session, chance: random.Random) -> tuple[bool, bool]
 
 
 def _flip_one(folder: Path, chance: random.Random) -> Path:
-    """Flip one bit of one file, each file as likely as it is large or the metadata are."""
+    """Flip one bit of one file; each file is as likely as the others, however small."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
     path = chance.choice(files)
     data = bytearray(path.read_bytes())
