@@ -8,12 +8,14 @@ imports Dagster.
 from __future__ import annotations
 
 import json
+import os
 import sys
 
 import click
 from click.shell_completion import CompletionItem
 
 from tsuya.console import output, says_errors
+from tsuya.interruption import EXIT_CODE
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
@@ -22,6 +24,22 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON o
 @click.version_option(package_name="tsuya")
 def main() -> None:
     """Appearance measurements to compact assets and pictures."""
+
+
+def start() -> None:
+    """The console script: ``main``, and an end that keeps the exit code of an interruption.
+
+    What was interrupted still holds arrays of Open3D when the process ends; Open3D then counts them
+    as leaks, and its own exit code would take the place of ours.
+    """
+    try:
+        main()
+    except SystemExit as end:
+        if end.code != EXIT_CODE:
+            raise
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(EXIT_CODE)
 
 
 class _Systems(click.Group):

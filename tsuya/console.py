@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tsuya.interruption import EXIT_CODE
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -45,7 +47,7 @@ def says_errors(command: Callable[..., None]) -> Callable[..., None]:
         try:
             command(*arguments, **options)
         except KeyboardInterrupt:
-            fail(INTERRUPTED, 130)
+            fail(INTERRUPTED, EXIT_CODE)
         except (ValueError, StoreError, SetUpError) as error:
             fail(str(error), 2)
 
