@@ -19,7 +19,7 @@ from assets_defs.memory import give_back_freed_memory
 from assets_defs.partitions import keys_of_partition
 from assets_defs.picture_links import PictureLinks
 from assets_defs.provenance import provenance
-from assets_defs.system import AssetPlan, System
+from assets_defs.system import NOTES, AssetPlan, System
 from assets_defs.workspace import Workspace
 from storage.errors import DamagedError, NoVersionError, StoreError
 from storage.io_manager import INTERRUPTED, damage_failure
@@ -129,6 +129,7 @@ def _materialise(
         }
         named = inspect.signature(plan.function).parameters
         dataset, metadata = plan.function(**{name: offered[name] for name in named})
+        notes = list(metadata.get(NOTES, ()))
         pictures = plan.pictures(dataset) if plan.pictures else {}
         links = PictureLinks(workspace, system.slot(plan.name, keys))
         shown = picture_metadata(pictures, links.keep) | dagster_metadata(metadata)
@@ -144,6 +145,7 @@ def _materialise(
     record = made_of | {
         "run": context.run.run_id,
         "checks": [check.name for check in plan.checks],
+        NOTES: notes,
     }
     return dg.Output(dataset.assign_attrs({RECORD: record}), metadata=shown)
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import dagster as dg
 
+from assets_defs.system import NOTES
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -27,7 +29,10 @@ def dagster_metadata(metadata: Mapping[str, Any]) -> dict[str, Any]:
     for name in metadata:
         if name.startswith((PICTURE, FULL_SIZE)):
             raise ValueError(f"metadata {name!r} is named like a picture; expected another name.")
-    return {name: _shown(value) for name, value in metadata.items()}
+    shown = {name: _shown(value) for name, value in metadata.items() if name != NOTES}
+    if metadata.get(NOTES):
+        shown[NOTES] = dg.MetadataValue.md("\n".join(f"- {note}" for note in metadata[NOTES]))
+    return shown
 
 
 def picture_metadata(

@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 
 Metadata = Mapping[str, Any]
 """For the web UI: numbers, texts; rows of equal columns, a list of dicts, become a table, a picture
-(y, x) or (y, x, 3) of 8 bits a thumbnail."""
+(y, x) or (y, x, 3) of 8 bits a thumbnail. ``NOTES`` is for people wherever they look."""
+NOTES = "notes"
+"""Of an asset's metadata: sentences on what was converted, mended or left out of a user's file.
+They stay with the version, and the command line prints them."""
 Result = tuple["xr.Dataset", Metadata]
 """What an asset's function returns."""
 Pictures = Mapping[str, "NDArray[np.uint8]"]

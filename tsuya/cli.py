@@ -102,7 +102,7 @@ def demo(as_json: bool) -> None:
 def status(as_json: bool) -> None:
     """What is stored: versions, sizes, what waits for checks, what was rejected."""
     from assets_defs.workspace import Workspace
-    from tsuya.report import slot_report, status_notes, status_table
+    from tsuya.report import file_notes, slot_report, status_notes, status_table
 
     store = Workspace.of_checkout().store
     reports = [slot_report(store, slot) for slot in store.slots()]
@@ -110,7 +110,7 @@ def status(as_json: bool) -> None:
         click.echo(json.dumps({"assets": reports}))
     else:
         output().print(status_table(reports))
-        for note in status_notes(reports):
+        for note in (*file_notes(reports), *status_notes(reports)):
             click.echo(note)
 
 

@@ -40,6 +40,7 @@ def slot_report(store: VersionedStore, slot: Slot) -> dict[str, Any]:
         report |= {
             "created": record["created"],
             "settings": record["settings"],
+            "notes": record.get("notes", []),  # none in versions of before
             "bytes": stored_bytes(store.folder(slot)),
             "figures": {
                 check: verdict["figure"]
@@ -48,6 +49,11 @@ def slot_report(store: VersionedStore, slot: Slot) -> dict[str, Any]:
             },
         }
     return report
+
+
+def file_notes(reports: Sequence[dict[str, Any]]) -> list[str]:
+    """What was converted, mended or left out of users' files: a line each."""
+    return [f"{report['key']}: {note}" for report in reports for note in report.get("notes", ())]
 
 
 def outcome_reports(store: VersionedStore, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from tsuya.console import INTERRUPTED, fail, output, shown_path
 from tsuya.display import Display
 from tsuya.history import open_history
 from tsuya.interruption import Interruption
-from tsuya.report import figures_table, outcome_reports, sizes_table
+from tsuya.report import figures_table, file_notes, outcome_reports, sizes_table
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,8 @@ def report(session: Session, launched: Launched, pictures: Sequence[Path], as_js
         output().print(sizes_table(systems, reports), figures_table(systems, reports))
         made = sum(1 for outcome in launched.outcomes if outcome.state == "made")
         current = len(reports) - made
+        for note in file_notes(reports):
+            click.echo(note)
         for path in pictures:
             click.echo(shown_path(path))
         click.echo(f"{made} made, {current} current already, {launched.seconds:.1f} s.")

@@ -12,7 +12,7 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.datasets import scene_dataset
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Result
+from assets_defs.system import NOTES, Result
 from pipelines.ssdf_lighting import figures
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
@@ -97,5 +97,5 @@ def scene_mesh(settings: SceneSettings, source: Source) -> Result:
     return scene_dataset(scene, source.name), {
         "vertices": len(scene.vertices),
         "triangles": len(scene.triangles),
-        "repaired": " ".join(scene.notes) or "nothing",
+        NOTES: scene.notes,
     }

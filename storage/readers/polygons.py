@@ -20,13 +20,17 @@ class PolygonMesh(NamedTuple):
     """``positions`` (P, 3) float64; ``sizes`` (F,) int64, corners of each polygon; ``corners``
     (sum of sizes,) int64, the position of each corner, one polygon after the other;
     ``corner_uvs`` (sum of sizes, 2) float64, or None; ``parts`` (F,) int64, which part of the
-    file each polygon is in (what a part is, the reader says), or None where the format has none."""
+    file each polygon is in (what a part is, the reader says), or None where the format has none;
+    ``corner_colours`` (sum of sizes, 4) float64, linear RGB and opacity in [0, 1], or None;
+    ``notes``, what was converted, mended or left out, a sentence each."""
 
     positions: NDArray[np.float64]
     sizes: NDArray[np.int64]
     corners: NDArray[np.int64]
     corner_uvs: NDArray[np.float64] | None
     parts: NDArray[np.int64] | None = None
+    corner_colours: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def triangulate(
