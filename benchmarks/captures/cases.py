@@ -1,7 +1,7 @@
-"""All cases, one kind of file after the other."""
+"""All cases, by the kind of file: each kind has a module of that name."""
 
 from __future__ import annotations
 
 from benchmarks.captures.case import Case
 
-CASES: tuple[Case, ...] = ()
+CASES: dict[str, tuple[Case, ...]] = {}
