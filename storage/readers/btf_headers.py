@@ -17,9 +17,9 @@ import numpy as np
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_archives import Members
 from storage.readers.btf_measured import check_area
-from storage.readers.btf_radiance import SIGNATURE, radiance_header
-from storage.readers.image_decoding import MEMORY_PER_BYTE
 from storage.readers.opening import check_memory
+from storage.readers.picture_sizes import MEMORY_PER_BYTE
+from storage.readers.radiance_files import SIGNATURE, radiance_header
 
 _EIGHT_BITS = "8-bit RGB"
 _PNG_CHANNELS = {0: "grey", 2: "RGB", 3: "palette", 4: "grey with alpha", 6: "RGB with alpha"}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_headers import Header
 from storage.readers.btf_measured import Crop
-from storage.readers.btf_radiance import radiance_pixels
+from storage.readers.radiance_files import radiance_pixels
 
 _RGB_OF_XYZ = np.array(
     [

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown_number
-from storage.readers.image_decoding import LARGEST_PICTURE, MEMORY_PER_BYTE, decode_image
+from storage.readers.image_decoding import decode_image
 from storage.readers.opening import check_file, check_memory, first_bytes
+from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
 
 FEWEST_CAMERAS = 2
 MOST_CAMERAS = 500

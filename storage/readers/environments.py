@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.btf_radiance import (
+from storage.readers.image_decoding import decode_image
+from storage.readers.opening import check_memory, first_bytes
+from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
+from storage.readers.radiance_files import (
     SIGNATURE,
     RadianceHeader,
     radiance_header,
     radiance_pixels,
 )
-from storage.readers.image_decoding import LARGEST_PICTURE, MEMORY_PER_BYTE, decode_image
-from storage.readers.opening import check_memory, first_bytes
 
 SMALLEST_WIDTH = 16
 LARGEST_WIDTH = 16384

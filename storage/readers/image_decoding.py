@@ -19,17 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.opening import check_memory, first_bytes
+from storage.readers.exr_files import read_exr
+from storage.readers.opening import first_bytes
+from storage.readers.picture_sizes import LARGEST_PICTURE, check_area
 
 if TYPE_CHECKING:
     import tifffile
     from PIL import Image, ImageFile
 
-LARGEST_MEGAPIXELS = 400
-LARGEST_PICTURE = 4 << 30
-"""Bytes of a file."""
-MEMORY_PER_BYTE = 500
-"""Of a file: the best compressed photographs take as much, and what unfolds to more is none."""
 FORMATS = "a PNG, JPEG, TIFF or EXR photograph"
 
 _PNG_END = b"IEND\xaeB`\x82"  # the last chunk's name and checksum, the same in every PNG
@@ -53,11 +50,13 @@ class DecodedImage(NamedTuple):
 
     ``colours``: (height, width, 1 or 3), grey or RGB with the primaries of sRGB; unsigned
     integers are codes of the sRGB curve, floats are linear. ``opaque``: (height, width) bool,
-    or None where the file has no alpha.
+    or None where the file has no alpha. ``notes``: sentences on what was converted, mended or
+    left out.
     """
 
     colours: NDArray[Any]
     opaque: NDArray[np.bool_] | None
+    notes: tuple[str, ...] = ()
 
 
 def decode_image(file: Path) -> DecodedImage:
@@ -89,16 +88,6 @@ def decode_image(file: Path) -> DecodedImage:
 
 def _damaged(file: Path, kind: str) -> BadInput:
     return BadInput(file, "content", "truncated or damaged", f"a complete {kind} file")
-
-
-def _check_area(file: Path, width: int, height: int, pixel_bytes: int) -> None:
-    """``pixel_bytes``: of one pixel with all its channels, as it is decoded."""
-    found = f"{width} x {height} pixels"
-    if width * height > LARGEST_MEGAPIXELS * 1_000_000:
-        raise BadInput(file, "size", found, f"at most {LARGEST_MEGAPIXELS} megapixels")
-    # Decoded, turned about and converted, then three floats and what is asked of each.
-    needed = width * height * (3 * pixel_bytes + 20)
-    check_memory(file, "size", found, needed, file.stat().st_size, MEMORY_PER_BYTE)
 
 
 # --- PNG and JPEG -------------------------------------------------------------------------------
@@ -135,7 +124,7 @@ def _load_with_pillow(
     """Open through the format's own class: ``Image.open`` would apply a limit of its own, which
     can only be changed for the whole process."""
     image = plugin(stream)
-    _check_area(file, *image.size, pixel_bytes)
+    check_area(file, *image.size, pixel_bytes)
     image.load()
     return image
 
@@ -202,9 +191,9 @@ def _decode_tiff(file: Path) -> DecodedImage:
     if not complete:
         raise _damaged(file, "TIFF")
     pixel_bytes = (page.dtype.itemsize if page.dtype else 1) * max(page.samplesperpixel, 4)
-    _check_area(file, int(page.imagewidth), int(page.imagelength), pixel_bytes)
+    check_area(file, int(page.imagewidth), int(page.imagelength), pixel_bytes)
     if page.is_tiled:
-        _check_area(file, int(page.tilewidth), int(page.tilelength), pixel_bytes)
+        check_area(file, int(page.tilewidth), int(page.tilelength), pixel_bytes)
     kind = str(np.dtype(page.dtype)) if page.dtype else f"{page.bitspersample} bit"
     if kind in ("uint16", "float32", "float64"):
         return _deep_tiff(file, page, np.dtype(kind))
@@ -269,43 +258,9 @@ def _decode_with_opencv(
 
 
 def _decode_exr(file: Path) -> DecodedImage:
-    import OpenEXR
-
-    with OpenEXR.File(str(file), header_only=True) as header_file:
-        part = header_file.parts[0]
-        # Copied: closing the file empties the header.
-        primaries = part.header.get("chromaticities")
-        for every in header_file.parts:  # all are decoded
-            _check_area(file, every.width(), every.height(), 4 * len(every.channels))
-    with OpenEXR.File(str(file), separate_channels=True) as exr:
-        channels = {name: channel.pixels for name, channel in exr.channels().items()}
-    _check_primaries(file, primaries)
-    names = _colour_channels(file, channels)
-    colours = np.stack([channels[name] for name in names], axis=-1)
-    alpha = channels.get("A")
-    return DecodedImage(colours, None if alpha is None else alpha >= 1)
-
-
-def _colour_channels(file: Path, channels: dict[str, NDArray[Any]]) -> tuple[str, ...]:
-    for names in (("R", "G", "B"), ("Y",)):
-        # Luminance with subsampled chroma (Y, RY, BY) is not grey.
-        if set(names) <= channels.keys() and "RY" not in channels:
-            break
-    else:
-        found = ", ".join(sorted(channels)[:8]) or "none"
-        raise BadInput(file, "channels", found, "R, G and B, or Y alone")
-    types = {channels[name].dtype for name in names}
-    if len({channels[name].shape for name in names}) > 1 or {t.kind for t in types} != {"f"}:
-        raise BadInput(file, "channels", "not alike", "half or float channels of one size")
-    return names
-
-
-def _check_primaries(file: Path, found: tuple[float, ...] | None) -> None:
-    """Without the attribute an EXR has the primaries of Rec. 709, which are those of sRGB."""
-    rec709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-    if found is not None and not np.allclose(np.ravel(found), rec709, atol=2e-3):
-        text = ", ".join(f"{value:.4g}" for value in np.ravel(found))
-        raise BadInput(file, "chromaticities", text, "those of sRGB")
+    picture = read_exr(file)
+    opaque = None if picture.alpha is None else picture.alpha >= 1
+    return DecodedImage(picture.colours, opaque, picture.notes)
 
 
 # --- Colour profiles ----------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Radiance pictures (``.hdr``), as the HDR part of ATRIUM holds them.
+"""Radiance pictures (``.hdr``): light probes, and the photographs of ATRIUM's HDR part.
 
 Written after Ward's "Radiance File Formats" and the resolution lines of Radiance's ``resolu.h``:
 true x grows to the right, true y upwards; the resolution line names the slow axis first, each
