@@ -40,8 +40,9 @@ lint: setup      ## ruff and mypy
 	@$(VENV)/ruff format --check .
 	@$(VENV)/mypy
 
-docs: setup      ## docs/assets.md from the schemas; docs/pictures/, made for the pages
+docs: setup      ## docs/assets.md from the schemas; docs/inputs.md; docs/pictures/, made for the pages
 	@$(VENV)/python -m docs.assets
+	@$(VENV)/python -m docs.inputs
 	@$(VENV)/python -m docs.pictures
 
 doctor: setup    ## check this machine and draw one picture
