@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assets_defs.ssdf_lighting.texture_variables import (
+    texture_variables,
+    textures_of,
+    tint_variable,
+)
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
@@ -52,6 +57,8 @@ def scene_dataset(scene: Scene, name: str) -> xr.Dataset:
             "albedo": (("material", "channel"), scene.materials.albedo),
             "specular": (("material",), scene.materials.specular),
             "roughness": (("material",), scene.materials.roughness),
+            **tint_variable(scene.materials),
+            **({} if scene.textures is None else texture_variables(scene.textures)),
             "middle": (("axis",), scene.middle),
             "scale": ((), scene.scale),
         },
@@ -69,10 +76,14 @@ def scene_of(scene_mesh: xr.Dataset) -> Scene:
         scene_mesh["triangles"].values,
         scene_mesh["normals"].values,
         scene_mesh["part"].values,
-        Materials(*(scene_mesh[name].values for name in ("albedo", "specular", "roughness"))),
+        Materials(
+            *(scene_mesh[name].values for name in ("albedo", "specular", "roughness")),
+            scene_mesh["tint"].values if "tint" in scene_mesh else None,
+        ),
         scene_mesh["middle"].values,
         float(scene_mesh["scale"]),
         tuple(scene_mesh.attrs["notes"]),
+        textures_of(scene_mesh) if "uvs" in scene_mesh else None,
     )
 
 

@@ -7,6 +7,7 @@ all its digits in single precision. z is up.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,9 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry import shapes
 from pipelines.geometry.meshes import check_mesh
-from pipelines.geometry.repair import repair_mesh
+from pipelines.geometry.refinement import refine_mesh
+from pipelines.geometry.repair import RepairedMesh, repair_mesh
 from pipelines.geometry.solids import creased_normals
 from pipelines.ssdf_lighting.light.microfacets import Materials
+from pipelines.ssdf_lighting.surface_textures import SurfaceTextures
 
 FloatArray = NDArray[np.float64]
 
@@ -37,6 +40,7 @@ class Scene(NamedTuple):
     part: (F,) int32, row of ``materials``.
     middle: (3,), scale: the given position of a vertex is ``vertex * scale + middle``.
     notes: what was repaired, one sentence each.
+    textures: of the triangles' corners (F, 3), where materials vary.
     """
 
     vertices: FloatArray
@@ -47,13 +51,14 @@ class Scene(NamedTuple):
     middle: FloatArray
     scale: float
     notes: tuple[str, ...]
+    textures: SurfaceTextures | None = None
 
 
 class LitMesh(NamedTuple):
-    """What is drawn, each vertex of one material.
+    """What is drawn, each vertex of one material and at one place of its textures.
 
     vertices: (V, 3). triangles: (F, 3), each inside one object. normals: (V, 3), unit.
-    object_of_vertex: (V,), row of ``materials``.
+    object_of_vertex: (V,), row of ``materials``. textures: of the vertices (V,).
     """
 
     vertices: FloatArray
@@ -61,6 +66,7 @@ class LitMesh(NamedTuple):
     normals: FloatArray
     object_of_vertex: NDArray[np.integer]
     materials: Materials
+    textures: SurfaceTextures | None = None
 
 
 class SplitScene(NamedTuple):
@@ -72,11 +78,18 @@ class SplitScene(NamedTuple):
 
 
 def make_scene(
-    vertices: ArrayLike, triangles: ArrayLike, part: ArrayLike, materials: Materials
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    part: ArrayLike,
+    materials: Materials,
+    textures: SurfaceTextures | None = None,
+    longest: float = math.inf,
 ) -> Scene:
     """Repair, centre and scale a mesh (see `repair.repair_mesh`), and split it along sharp edges.
 
-    vertices (V, 3); triangles (F, 3) and part (F,) integers. Raises ValueError for what is no mesh.
+    vertices (V, 3); triangles (F, 3) and part (F,) integers; textures of the triangles' corners.
+    Edges longer than ``longest`` scene radii are cut: light is found at vertices. Raises ValueError
+    for what is no mesh.
     """
     points = np.array(vertices, np.float64)
     corners = np.asarray(triangles)
@@ -86,20 +99,57 @@ def make_scene(
     scale = float(np.linalg.norm(used - middle, axis=1).max())
     if not scale > 0.0:
         raise ValueError("all vertices are at one position; expected a mesh of some size.")
-    mended = repair_mesh((points - middle) / scale, corners)
-    at_corners = creased_normals(mended.vertices, mended.triangles, _CREASE)
-    rows = np.column_stack([mended.triangles.ravel(), np.rint(at_corners.reshape(-1, 3) / _ALIKE)])
-    _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    points = (points - middle) / scale
+    mended = repair_mesh(points, corners)
+    smooth = creased_normals(mended.vertices, mended.triangles, _CREASE)
+    rows = mended.kept
+    if textures is not None:
+        textures = _repaired_textures(textures, points[corners], mended)
+    if longest < math.inf:
+        fine = refine_mesh(mended.vertices, mended.triangles, longest)
+        rows, smooth = rows[fine.owner], _unit(fine.weights @ smooth[fine.owner])
+        if textures is not None:
+            textures = _refined_textures(textures, fine.owner, fine.weights)
+        points, corners = fine.vertices, fine.triangles
+    else:
+        points, corners = mended.vertices, mended.triangles
+    keys = np.column_stack([corners.ravel(), np.rint(smooth.reshape(-1, 3) / _ALIKE)])
+    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     return Scene(
-        mended.vertices[mended.triangles.ravel()[first]],
+        points[corners.ravel()[first]],
         number.reshape(-1, 3).astype(np.int32),
-        at_corners.reshape(-1, 3)[first],
-        np.asarray(part, np.int32)[mended.kept],
+        smooth.reshape(-1, 3)[first],
+        np.asarray(part, np.int32)[rows],
         materials,
         middle,
         scale,
         mended.notes,
+        textures,
     )
+
+
+def _repaired_textures(
+    textures: SurfaceTextures, given: FloatArray, mended: RepairedMesh
+) -> SurfaceTextures:
+    """``given`` (F, 3, 3), the corners before the repair, which turns some triangles over."""
+    second = given[mended.kept, 1]
+    apart = np.linalg.norm(mended.vertices[mended.triangles] - second[:, None], axis=2)
+    order = np.where((apart[:, 2] < apart[:, 1])[:, None], [0, 2, 1], [0, 1, 2])
+    rows = mended.kept[:, None]
+    return textures._replace(uvs=textures.uvs[rows, order], colours=textures.colours[rows, order])
+
+
+def _refined_textures(
+    textures: SurfaceTextures, owner: NDArray[np.int64], weights: FloatArray
+) -> SurfaceTextures:
+    uvs = np.einsum("fkj,fjmc->fkmc", weights, textures.uvs[owner])
+    colours = weights @ textures.colours[owner]
+    return textures._replace(uvs=uvs.astype(np.float32), colours=colours.astype(np.float32))
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    unit: FloatArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return unit
 
 
 def built_in_scene(name: str, segments: int, floor: int) -> Scene:
@@ -145,8 +195,10 @@ def built_in_scene(name: str, segments: int, floor: int) -> Scene:
 
 
 def split_by_part(scene: Scene) -> SplitScene:
-    """Double the vertices at which parts meet: one for each of the materials."""
+    """Double the vertices at which parts, or places in textures, meet: one for each of them."""
     keys = scene.triangles.astype(np.int64) * len(scene.materials.albedo) + scene.part[:, None]
+    if scene.textures is not None:
+        return _split_by_texture(scene, scene.textures, keys)
     found, number = np.unique(keys, return_inverse=True)
     count = len(scene.materials.albedo)
     source = found // count
@@ -156,6 +208,36 @@ def split_by_part(scene: Scene) -> SplitScene:
         scene.normals[source],
         (found % count).astype(np.int32),
         scene.materials,
+    )
+    return SplitScene(mesh, source)
+
+
+def _split_by_texture(
+    scene: Scene, textures: SurfaceTextures, keys: NDArray[np.int64]
+) -> SplitScene:
+    """``keys`` (F, 3): vertex times materials plus material, so that sources ascend."""
+    keys = keys.ravel()
+    places = np.concatenate(
+        [textures.uvs.reshape(len(keys), -1), textures.colours.reshape(len(keys), -1)], axis=1
+    )
+    order = np.lexsort((*places.T, keys))
+    new = np.ones(len(order), bool)
+    new[1:] = keys[order[1:]] != keys[order[:-1]]
+    new[1:] |= (places[order[1:]] != places[order[:-1]]).any(axis=1)
+    number = np.empty(len(order), np.int32)
+    number[order] = np.cumsum(new) - 1
+    first = order[new]
+    source = scene.triangles.ravel()[first].astype(np.int64)
+    mesh = LitMesh(
+        scene.vertices[source],
+        number.reshape(scene.triangles.shape),
+        scene.normals[source],
+        np.repeat(scene.part, 3)[first],
+        scene.materials,
+        textures._replace(
+            uvs=textures.uvs.reshape(-1, 2, 2)[first],
+            colours=textures.colours.reshape(-1, 3)[first],
+        ),
     )
     return SplitScene(mesh, source)
 

@@ -5,6 +5,62 @@ from storage.schemas.schema import Schema, Variable
 _SYSTEM = "ssdf_lighting"
 _PAPER = "section 2"
 
+_TEXTURES = {
+    "uvs": Variable(
+        ("triangle", "corner", "mapping", "coordinate"),
+        "float32",
+        "texture",
+        "Two texture coordinates of each corner, v from the bottom",
+        optional=True,
+    ),
+    "colours": Variable(
+        ("triangle", "corner", "channel"),
+        "float32",
+        "1",
+        "Of the corners, linear, times the base colour",
+        optional=True,
+    ),
+    "varying": Variable(
+        ("varying",), "int32", "1", "Row of each material that varies", optional=True
+    ),
+    "factors": Variable(
+        ("varying", "factor"),
+        "float64",
+        "1",
+        "Base colour, metalness, F0 of what is no metal, roughness (root of the slope), bend",
+        optional=True,
+    ),
+    "texture_of": Variable(
+        ("texture", "place"),
+        "int32",
+        "1",
+        "Row of the varying material, and what it says: 0 colour, 1 surface, 2 normal",
+        optional=True,
+    ),
+    "texture_size": Variable(
+        ("texture", "coordinate"), "int32", "texel", "Width and height", optional=True
+    ),
+    "texture_wrap": Variable(
+        ("texture", "coordinate"),
+        "int32",
+        "1",
+        "Outside of [0, 1]: 0 repeated, 1 mirrored, 2 clamped",
+        optional=True,
+    ),
+    "texture_mapping": Variable(
+        ("texture",), "int32", "1", "Which of the two texture coordinates", optional=True
+    ),
+    "texels": Variable(
+        ("texel", "channel"),
+        "uint8",
+        "1",
+        "Row by row from the top, one texture after the other: sRGB codes; shares of F0, of the "
+        "roughness, of the metalness; normals",
+        optional=True,
+    ),
+}
+"""Of scenes with textures or colours of vertices."""
+
 SCENE_MESH = Schema(
     _SYSTEM,
     "scene_mesh",
@@ -22,6 +78,14 @@ SCENE_MESH = Schema(
             ("material",), "float64", "1", "Fresnel reflectance at normal incidence; 0 = no gloss"
         ),
         "roughness": Variable(("material",), "float64", "1", "Beckmann's slope m"),
+        "tint": Variable(
+            ("material", "channel"),
+            "float64",
+            "1",
+            "What the gloss is multiplied by: colours of metals",
+            optional=True,
+        ),
+        **_TEXTURES,
         "middle": Variable(("axis",), "float64", "mesh unit", "Given position of the origin"),
         "scale": Variable((), "float64", "mesh unit", "Given length of the scene's radius"),
     },

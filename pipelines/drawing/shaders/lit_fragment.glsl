@@ -1,20 +1,40 @@
 // A mesh lit by LIGHTS spherical Gaussians, with GLOSS or without: software renderers take both
-// sides of a branch.
+// sides of a branch. TEXTURED: one material, with those of the three textures that it has.
 
 #include "sg_gloss.glsl"
 #include "sg_matt.glsl"
+#include "textured_surface.glsl"
 
 uniform vec4 eye;                      // the view is along eye.xyz - eye.w * place
 uniform float lights[4 * LIGHTS];      // axes and sharpness
 uniform float amplitudes[3 * LIGHTS];
 uniform sampler2D matt;                // a row for each light: lobes from behind to straight above
-uniform sampler2D materials;           // row 0: albedo, specular; row 1: roughness
 #if GLOSS
 uniform sampler2D gloss;               // a row for each material: lobes by the view's cosine
 #endif
 in vec3 shadingOut;
 in vec3 placeOut;
+#if TEXTURED
+uniform vec4 factors;                  // base colour, metalness
+uniform vec4 finish;                   // specular, roughness, how much the normals bend
+#if COLOUR_MAP
+uniform sampler2D colourMap;
+uniform vec4 colourPlace, colourLimits;
+#endif
+#if SURFACE_MAP
+uniform sampler2D surfaceMap;
+uniform vec4 surfacePlace, surfaceLimits;
+#endif
+#if NORMAL_MAP
+uniform sampler2D normalMap;
+uniform vec4 normalPlace, normalLimits;
+#endif
+in vec3 paintOut;
+in vec4 mappingsOut;
+#else
+uniform sampler2D materials;           // row 0: albedo, specular; row 1: roughness, tint
 flat in float objectOut;
+#endif
 in vec4 edges[EDGES];
 
 vec4 light(int number) {
@@ -27,39 +47,87 @@ vec3 amplitude(int number) {
   return vec3(amplitudes[at], amplitudes[at + 1], amplitudes[at + 2]);
 }
 
+#if TEXTURED
+Look seenLook() {
+  vec3 base = factors.rgb * paintOut, shares = vec3(1.0), normal = normalize(shadingOut);
+#if COLOUR_MAP
+  base *= texelAt(colourMap, mappingsOut, colourPlace, colourLimits);
+#endif
+#if SURFACE_MAP
+  shares = texelAt(surfaceMap, mappingsOut, surfacePlace, surfaceLimits);
+#endif
+  Look seen = lookOf(normal, base, factors.w * shares.b, finish.x * shares.r, finish.y * shares.g);
+#if NORMAL_MAP
+  vec3 bump = 2.0 * texelAt(normalMap, mappingsOut, normalPlace, normalLimits) - 1.0;
+  seen.roughness = roughenedSlope(seen.roughness, length(bump), finish.z);
+  bump.xy *= finish.z;
+  vec2 mapping = normalPlace.z < 0.5 ? mappingsOut.xy : mappingsOut.zw;
+  seen.normal = bentNormal(normal, bump, dFdx(placeOut), dFdy(placeOut), dFdx(mapping),
+                           dFdy(mapping));
+#endif
+  seen.specular = min(seen.specular, MOST_SPECULAR);
+  seen.roughness = max(seen.roughness, LEAST_SLOPE);
+  return seen;
+}
+#else
+Look seenLook() {
+  int row = int(objectOut + 0.5);
+  vec4 look = texelFetch(materials, ivec2(row, 0), 0);
+  vec4 rest = texelFetch(materials, ivec2(row, 1), 0);
+  return Look(normalize(shadingOut), look.rgb, rest.gba, look.a, rest.r);
+}
+#endif
+
 #if GLOSS
-Gloss seenGloss(vec3 normal, int row, float specular) {
+#if TEXTURED
+// Between the rows of the table, which has all materials.
+vec4 fittedGloss(float column, Look look) {
+  vec2 start = vec2(GRID_START), end = vec2(GRID_END), steps = vec2(GRID_STEPS);
+  vec2 given = vec2(look.roughness, look.specular);
+  vec2 at = log(clamp(given, start, end) / start) / log(end / start) * (steps - 1.0);
+  float lower = min(floor(at.y), steps.y - 2.0);
+  vec2 size = vec2(float(GLOSS_COLUMNS), steps.x * steps.y);
+  vec2 here = (vec2(column, lower * steps.x + at.x) + 0.5) / size;
+  vec4 fitted = mix(texture(gloss, here), texture(gloss, here + vec2(0.0, steps.x / size.y)),
+                    at.y - lower);
+  fitted.x = exp(fitted.x);
+  fitted.w += log(max(min(look.specular / start.y, 1.0), 1e-6));
+  return fitted;
+}
+#else
+vec4 fittedGloss(float column, Look look) {
+  int left = min(int(column), GLOSS_COLUMNS - 2), row = int(objectOut + 0.5);
+  return mix(texelFetch(gloss, ivec2(left, row), 0), texelFetch(gloss, ivec2(left + 1, row), 0),
+             column - float(left));
+}
+#endif
+
+Gloss seenGloss(Look look) {
   vec3 view = normalize(eye.xyz - eye.w * placeOut);
-  float facing = dot(normal, view);
+  float facing = dot(look.normal, view);
   float seen = clamp(facing, LEAST_VIEW, 1.0);
-  float column = seen * float(GLOSS_COLUMNS - 1);
-  int left = min(int(column), GLOSS_COLUMNS - 2);
-  vec4 fitted = mix(texelFetch(gloss, ivec2(left, row), 0),
-                    texelFetch(gloss, ivec2(left + 1, row), 0), column - float(left));
-  float roughness = texelFetch(materials, ivec2(row, 1), 0).r;
-  return glossOf(fitted, normal, view, facing, seen, roughness, specular);
+  vec4 fitted = fittedGloss(seen * float(GLOSS_COLUMNS - 1), look);
+  return glossOf(fitted, look.normal, view, facing, seen, look.roughness, look.specular);
 }
 #endif
 
 vec3 surfaceColour() {
-  vec3 normal = normalize(shadingOut);
-  int row = int(objectOut + 0.5);
-  vec4 look = texelFetch(materials, ivec2(row, 0), 0);
+  Look look = seenLook();
   vec3 lit = vec3(0.0);
 #pragma unroll_loop_start
   for (int i = 0; i < LIGHTS; i++) {
-    float column = dot(normal, light(i).xyz) * MATT_HALF + (MATT_HALF + 0.5);
+    float column = dot(look.normal, light(i).xyz) * MATT_HALF + (MATT_HALF + 0.5);
     vec3 lobe = texelFetch(matt, ivec2(column, i), 0).rgb;
     lit += amplitude(i) * mattRadiance(lobe, edges[i / 4][i % 4]);
   }
 #pragma unroll_loop_end
-  lit *= look.rgb;
+  lit *= look.albedo;
 #if GLOSS
-  Gloss seen = seenGloss(normal, row, look.a);
+  Gloss seen = seenGloss(look);
 #pragma unroll_loop_start
   for (int i = 0; i < LIGHTS; i++) {
-    lit += amplitude(i)
-      * glossRadiance(seen, light(i), edges[(LIGHTS + 3) / 4 + i / 4][i % 4], normal);
+    lit += amplitude(i) * look.tint
+      * glossRadiance(seen, light(i), edges[(LIGHTS + 3) / 4 + i / 4][i % 4], look.normal);
   }
 #pragma unroll_loop_end
 #endif

@@ -1,18 +1,31 @@
 // A mesh lit by spherical Gaussians: distances to the edge of the visible sky, four in a vector:
-// of LIGHTS matt lobes, and after these, from a new vector on, of as many glossy ones.
+// of LIGHTS matt lobes, and after these, from a new vector on, of as many glossy ones. With
+// textures (TEXTURED) it has places in them and a colour, else the number of its material.
 
 in vec3 shading;
+#if TEXTURED
+in vec3 paint;
+in vec4 mappings;
+out vec3 paintOut;
+out vec4 mappingsOut;
+#else
 in float object;
+flat out float objectOut;
+#endif
 in vec4 edge0, edge1, edge2, edge3, edge4, edge5, edge6, edge7, edge8, edge9, edge10, edge11;
 out vec3 shadingOut;
 out vec3 placeOut;
-flat out float objectOut;
 out vec4 edges[EDGES];
 
 void placeVertex() {
   shadingOut = shading;
   placeOut = vertexMC.xyz;
+#if TEXTURED
+  paintOut = paint;
+  mappingsOut = mappings;
+#else
   objectOut = object;
+#endif
   vec4 given[12] = vec4[12](edge0, edge1, edge2, edge3, edge4, edge5,
                             edge6, edge7, edge8, edge9, edge10, edge11);
 #pragma unroll_loop_start

@@ -31,10 +31,10 @@ def render_numpy(
     """Linear radiance and coverage (height, width, 4) float64, row 0 at the top.
 
     ``size`` is (width, height). One ray through each pixel's middle; normals and the vertices'
-    distances are interpolated by barycentric weights. Raises ValueError as ``build_scene`` and
-    ``lobe_tables``.
+    distances are interpolated by barycentric weights; textures are not looked at. Raises ValueError
+    as ``build_scene`` and ``lobe_tables``.
     """
-    points, corners, shading, material, materials = mesh
+    points, corners, shading, material, materials, _ = mesh
     tables, shares = lobe_tables(materials, lights), visible_table()
     at_vertices = lobes(
         shading, view_vectors(camera, points), material, materials, lights, tables=tables

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits, occluded
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
-from pipelines.ssdf_lighting.light.microfacets import Materials, beckmann, check_materials, gloss
+from pipelines.ssdf_lighting.drawing.hit_looks import HitLooks
+from pipelines.ssdf_lighting.light.microfacets import beckmann, check_materials, gloss
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
 from pipelines.ssdf_lighting.scene import LitMesh
+from pipelines.ssdf_lighting.surface_textures import Looks
 
 if TYPE_CHECKING:
     from open3d.t.geometry import RaycastingScene
@@ -42,6 +44,7 @@ class Traced(NamedTuple):
 
 class _Surface(NamedTuple):
     mesh: LitMesh
+    looks: HitLooks
     facing: FloatArray
     """(F, 3) geometric unit normals, on the side of the shading normals."""
     off: FloatArray
@@ -49,14 +52,14 @@ class _Surface(NamedTuple):
 
 
 class _Spots(NamedTuple):
-    """Where S samples hit the surface. ``facing`` is the geometric normal; all (S, 3) but ``row``
-    (S,), the material's."""
+    """Where S samples hit the surface. ``facing`` is the geometric normal; all (S, 3) but the
+    looks, which have a row each."""
 
     at: FloatArray
     normal: FloatArray
     facing: FloatArray
     view: FloatArray
-    row: NDArray[np.integer]
+    looks: Looks
 
 
 def ray_traced(
@@ -74,14 +77,14 @@ def ray_traced(
 
     progress: is told the share of the work that is done.
     jittered: samples are spread evenly over the pixel; else all go through its middle, as the
-        stage's do.
+        stage's do; textures are averaged over the pixel, as there.
 
     Light from below the triangle or its shading normal does not arrive. Raises ValueError as
     ``build_scene`` and for materials that are none.
     """
     check_materials(mesh.materials)
     scene = build_scene(mesh.vertices, mesh.triangles)
-    surface = _surface(mesh)
+    surface = _surface(mesh, HitLooks(mesh, camera, size, 1 / math.sqrt(samples)))
     middles = pixel_centres(size)
     picture, error = np.zeros((len(middles), 4)), np.zeros((len(middles), 3))
     rows = max(1, _AT_ONCE // samples)
@@ -92,9 +95,9 @@ def ray_traced(
         # Each block has numbers of its own: the picture does not depend on the blocks' order.
         rng = np.random.default_rng([seed, first])
         u = _spread(len(middles[block]), samples, rng)
-        if jittered:
-            places += u[:, 4:] - 0.5
-        light, hit = _sampled(scene, surface, lights, camera, size, places, u[:, :4])
+        spread = places + u[:, 4:] - 0.5
+        rays = camera_rays(camera, size, spread if jittered else places)
+        light, hit = _sampled(scene, surface, lights, rays, spread, u[:, :4])
         light = light.reshape(-1, samples, 3)
         picture[block, :3] = light.mean(axis=1)
         picture[block, 3] = hit.reshape(-1, samples).mean(axis=1)
@@ -111,28 +114,27 @@ def _spread(pixels: int, samples: int, rng: np.random.Generator) -> FloatArray:
     return ((points + rng.random((pixels, 1, 6))) % 1.0).reshape(-1, 6)
 
 
-def _surface(mesh: LitMesh) -> _Surface:
+def _surface(mesh: LitMesh, looks: HitLooks) -> _Surface:
     a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
     facing = np.cross(b - a, c - a)
     doubled = np.linalg.norm(facing, axis=1, keepdims=True)
     facing = facing / np.maximum(doubled, 1e-300)
     outer = mesh.normals[mesh.triangles].sum(axis=1)
     facing = np.where(np.sum(facing * outer, axis=1, keepdims=True) < 0, -facing, facing)
-    return _Surface(mesh, facing, _OFF_SURFACE * np.sqrt(doubled[:, 0]))
+    return _Surface(mesh, looks, facing, _OFF_SURFACE * np.sqrt(doubled[:, 0]))
 
 
 def _sampled(
     scene: RaycastingScene,
     surface: _Surface,
     lights: Lights,
-    camera: Camera,
-    size: tuple[int, int],
+    rays: tuple[FloatArray, FloatArray],
     places: FloatArray,
     u: FloatArray,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """One sample's light (S, 3) for each place (S, 2) of the picture, and whether it hit;
-    ``u`` (S, 4) are its numbers in [0, 1)."""
-    origins, ways = camera_rays(camera, size, places)
+    """One sample's light (S, 3) for each ray, origins and ways (S, 3), and whether it hit; textures
+    are looked up at places (S, 2) of the picture; ``u`` (S, 4) are its numbers in [0, 1)."""
+    origins, ways = rays
     hits = first_hits(scene, origins, ways)
     hit = hits.triangle >= 0
     light = np.zeros((len(places), 3))
@@ -143,15 +145,16 @@ def _sampled(
     corner = mesh.triangles[triangle]
     facing = surface.facing[triangle]
     at = np.einsum("sk,skc->sc", weight, mesh.vertices[corner])
+    normals, looks = surface.looks.at(triangle, weight, places[hit])
     spots = _Spots(
         at + facing * surface.off[triangle][:, None],
-        _unit(np.einsum("sk,skc->sc", weight, mesh.normals[corner])),
+        normals,
         facing,
         -ways[hit],
-        mesh.object_of_vertex[corner[:, 0]],
+        looks,
     )
-    way, density, glow = _drawn(spots, mesh.materials, lights, u[hit])
-    reflected = _reflected(spots, mesh.materials, way)
+    way, density, glow = _drawn(spots, lights, u[hit])
+    reflected = _reflected(spots, way)
     above = (np.sum(way * spots.facing, axis=1) > 0) & (reflected > 0).any(axis=1)
     above[above] = ~occluded(scene, spots.at[above], way[above])
     light[hit] = np.where(above[:, None], glow * reflected / density[:, None], 0.0)
@@ -159,11 +162,11 @@ def _sampled(
 
 
 def _drawn(
-    spots: _Spots, materials: Materials, lights: Lights, u: FloatArray
+    spots: _Spots, lights: Lights, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Directions (S, 3), their density (S,) per steradian, and the radiance (S, 3) from there."""
-    roughness = materials.roughness[spots.row]
-    gloss_part = np.where(materials.specular[spots.row] > 0, (1 - _LIGHTS_PART) / 2, 0.0)
+    roughness = spots.looks.roughness
+    gloss_part = np.where(spots.looks.specular > 0, (1 - _LIGHTS_PART) / 2, 0.0)
     matt_part = 1 - _LIGHTS_PART - gloss_part
     whole = integral(lights.sharpness)
     # Lights that are below the horizon by their own width are hardly worth a sample.
@@ -200,7 +203,7 @@ def _drawn(
     return way, density, lobes @ lights.amplitudes
 
 
-def _reflected(spots: _Spots, materials: Materials, way: FloatArray) -> FloatArray:
+def _reflected(spots: _Spots, way: FloatArray) -> FloatArray:
     """BRDF times cosine (S, 3)."""
     half = _unit(way + spots.view)
     n_i = np.sum(way * spots.normal, axis=1)
@@ -209,11 +212,11 @@ def _reflected(spots: _Spots, materials: Materials, way: FloatArray) -> FloatArr
         np.sum(spots.view * spots.normal, axis=1),
         np.sum(half * spots.normal, axis=1),
         np.sum(half * spots.view, axis=1),
-        materials.specular[spots.row],
-        materials.roughness[spots.row],
+        spots.looks.specular,
+        spots.looks.roughness,
     )
-    matt = materials.albedo[spots.row] / math.pi * np.maximum(n_i, 0.0)[:, None]
-    return matt + shine[:, None]
+    matt = spots.looks.albedo / math.pi * np.maximum(n_i, 0.0)[:, None]
+    return matt + shine[:, None] * spots.looks.tint
 
 
 def _about(pole: FloatArray, cosine: FloatArray, azimuth: FloatArray) -> FloatArray:

@@ -18,15 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
-from pipelines.drawing.stage import Camera, Stage, surface, texture
+from pipelines.drawing.stage import Camera, Stage, surface
 from pipelines.ssdf_lighting.distances.edge_share import edge_share
 from pipelines.ssdf_lighting.drawing.camera_rays import eye
+from pipelines.ssdf_lighting.drawing.finishes import Finish, finishes, fixed
 from pipelines.ssdf_lighting.drawing.numpy_view import DistancesAt
+from pipelines.ssdf_lighting.drawing.textured_vertices import vertex_looks
 from pipelines.ssdf_lighting.light.cosine_lobes import CosineLobes
-from pipelines.ssdf_lighting.light.gloss_lobes import COLUMNS as GLOSS_COLUMNS
+from pipelines.ssdf_lighting.light.gloss_grid import gloss_grid, nearest_rows
 from pipelines.ssdf_lighting.light.gloss_lobes import GlossLobes
 from pipelines.ssdf_lighting.light.lobe_axes import AxisTables, lobe_axes
-from pipelines.ssdf_lighting.light.microfacets import LEAST_VIEW, Materials
 from pipelines.ssdf_lighting.light.shading import LobeTables, lobe_tables
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import LitMesh
@@ -35,7 +36,6 @@ MOST_LIGHTS = 24
 """Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
 _FINE = 2048
 """Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
-_GLOSS_VALUES = {"LEAST_VIEW": LEAST_VIEW, "GLOSS_COLUMNS": GLOSS_COLUMNS}
 
 
 class LitActor:
@@ -61,25 +61,14 @@ class LitActor:
         self._materials = materials
         self._points = np.ascontiguousarray(mesh.vertices, np.float32)
         self._normals = np.ascontiguousarray(mesh.normals, np.float32)
-        self._objects = objects.astype(np.int32)
         self._sharpness = np.array(lights.sharpness)
         tables = lobe_tables(materials, lights)
-        self._axis_tables = AxisTables(tables, materials.specular > 0)
+        self._rows = _rows_of_lobes(mesh)
+        self._axis_tables = self._make_axis_tables(tables)
         corners = np.asarray(mesh.triangles)
-        glossy = materials.specular[objects[corners[:, 0]]] > 0
         self._parts = [
-            _Part(
-                self._points,
-                corners[chosen],
-                self._normals,
-                objects,
-                materials,
-                tables,
-                has_gloss=has_gloss,
-            )
-            # First what is likely in front: less is painted over.
-            for has_gloss, chosen in ((True, glossy), (False, ~glossy))
-            if chosen.any()
+            _Part(self._points, corners, self._normals, tables.cosine, finish)
+            for finish in finishes(mesh, tables.gloss)
         ]
         self.actors = [part.actor for part in self._parts]
         self._set_lights(np.zeros(4), lights)
@@ -98,7 +87,7 @@ class LitActor:
         if not np.array_equal(lights.sharpness, self._sharpness):
             self._sharpness = np.array(lights.sharpness)
             tables = lobe_tables(self._materials, lights)
-            self._axis_tables = AxisTables(tables, self._materials.specular > 0)
+            self._axis_tables = self._make_axis_tables(tables)
             for part in self._parts:
                 part.show_tables(tables)
         self.show_distances(distances_at(self.axes(camera, lights)))
@@ -107,7 +96,7 @@ class LitActor:
     def axes(self, camera: Camera, lights: Lights) -> NDArray[np.float32]:
         """Axes (V, 2 N, 3) float32 of the lobes at the vertices."""
         return lobe_axes(
-            self._points, self._normals, self._objects, eye(camera), self._axis_tables, lights
+            self._points, self._normals, self._rows, eye(camera), self._axis_tables, lights
         )
 
     def show_distances(self, distances: NDArray[np.floating]) -> None:
@@ -122,6 +111,27 @@ class LitActor:
         for part in self._parts:
             part.set_lights(seen_from, lights)
 
+    def _make_axis_tables(self, tables: LobeTables) -> AxisTables:
+        """Rows of the materials, behind them those of the table for what has textures."""
+        has_gloss = self._materials.specular > 0
+        if self._rows.max(initial=0) < len(has_gloss):
+            return AxisTables(tables, has_gloss)
+        both = zip(tables.gloss, gloss_grid(), strict=True)
+        gloss = GlossLobes(*(np.concatenate(rows) for rows in both))
+        has_gloss = np.append(has_gloss, np.ones(len(gloss.along) - len(has_gloss), bool))
+        return AxisTables(LobeTables(tables.cosine, gloss), has_gloss)
+
+
+def _rows_of_lobes(mesh: LitMesh) -> NDArray[np.int32]:
+    """(V,): whose lobes the vertices have: their material's, or, behind the materials, the row of
+    the table that is nearest to what their textures say."""
+    rows = np.array(mesh.object_of_vertex, np.int32)
+    for vertices, looks in vertex_looks(mesh):
+        if looks.specular.any():
+            found = nearest_rows(looks.specular, looks.roughness)
+            rows[vertices] = found + len(mesh.materials.specular)
+    return rows
+
 
 class _Part:
     """The triangles of a lit mesh that share a shader; only their vertices."""
@@ -131,42 +141,37 @@ class _Part:
         points: NDArray[np.float32],
         triangles: NDArray[np.integer],
         normals: NDArray[np.float32],
-        objects: NDArray[np.integer],
-        materials: Materials,
-        tables: LobeTables,
-        *,
-        has_gloss: bool,
+        cosine: CosineLobes,
+        finish: Finish,
     ) -> None:
-        self._chosen, corners = np.unique(triangles, return_inverse=True)
-        self._count = count = len(tables.cosine.irradiance)
-        self._matt = _fixed(_matt_rows(tables.cosine))
-        textures = {"matt": self._matt, "materials": _fixed(_material_rows(materials))}
-        if has_gloss:
-            textures["gloss"] = _fixed(_gloss_rows(tables.gloss))
-        names = [f"edge{number}" for number in range(-(-count // 4) * (1 + has_gloss))]
+        self._chosen, corners = np.unique(triangles[finish.triangles], return_inverse=True)
+        self._count = count = len(cosine.irradiance)
+        self._matt = fixed(_matt_rows(cosine))
+        names = [f"edge{number}" for number in range(-(-count // 4) * (1 + finish.has_gloss))]
         self.actor = surface(
             points[self._chosen],
             corners.reshape(-1, 3),
             attributes={
                 "shading": normals[self._chosen],
-                "object": objects[self._chosen],
+                **{name: values[self._chosen] for name, values in finish.attributes.items()},
                 # Each its own: the mesh keeps them, and they are written to.
                 **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
             },
-            textures=textures,
+            textures={"matt": self._matt, **finish.textures},
             shader=surface_shader(
                 "lit_vertex.glsl",
                 "lit_fragment.glsl",
                 LIGHTS=count,
                 EDGES=len(names),
                 MATT_HALF=_FINE / 2,
-                GLOSS=has_gloss,
-                **(_GLOSS_VALUES if has_gloss else {}),
+                **finish.values,
             ),
             lit=False,
         )
         self._arrays, self._edges = _arrays_of(self.actor, names)
         self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
+        for name, values in finish.uniforms.items():
+            self._uniforms.SetUniform4f(name, values)
 
     def show_tables(self, tables: LobeTables) -> None:
         _memory_of(self._matt)[:] = _matt_rows(tables.cosine)
@@ -223,22 +228,6 @@ def _matt_rows(lobes: CosineLobes) -> NDArray[np.float32]:
     left = np.minimum(place.astype(np.int64), coarse.shape[2] - 2)
     fine = coarse[..., left] + (place - left) * (coarse[..., left + 1] - coarse[..., left])
     return np.moveaxis(fine, 0, -1).astype(np.float32)
-
-
-def _gloss_rows(lobes: GlossLobes) -> NDArray[np.float32]:
-    return np.stack(lobes, axis=-1).astype(np.float32)
-
-
-def _material_rows(materials: Materials) -> NDArray[np.float32]:
-    rows = np.zeros((2, len(materials.specular), 4), np.float32)
-    rows[0, :, :3], rows[0, :, 3] = materials.albedo, materials.specular
-    rows[1, :, 0] = materials.roughness
-    return rows
-
-
-def _fixed(rows: NDArray[np.float32]) -> Any:
-    """A texture whose row 0 is at t = 0, for texelFetch."""
-    return texture(np.ascontiguousarray(rows[::-1]), wrap="clamp", interpolate=False)
 
 
 def _memory_of(made: Any) -> NDArray[np.float32]:

@@ -27,16 +27,18 @@ class Materials(NamedTuple):
     albedo: (M, 3) float64, linear, 0 to 1.
     specular: (M,) float64, F0 of the gloss, 0 to below 1; 0: there is none.
     roughness: (M,) float64, Beckmann's root mean square slope m, above 0.
+    tint: (M, 3) float64, what the gloss is multiplied by: metals colour it. None: 1.
     """
 
     albedo: FloatArray
     specular: FloatArray
     roughness: FloatArray
+    tint: FloatArray | None = None
 
 
 def check_materials(materials: Materials) -> None:
     """Raise ValueError unless the arrays belong together and hold what they may."""
-    albedo, specular, roughness = materials
+    albedo, specular, roughness, _ = materials
     count = len(albedo)
     if albedo.shape != (count, 3) or specular.shape != (count,) or roughness.shape != (count,):
         raise ValueError(

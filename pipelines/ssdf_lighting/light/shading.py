@@ -143,10 +143,13 @@ def _glossy(
     shown = has_gloss & (true > 0)
     reflected = np.where(shown, integral(sharpness) * scale * mended, 0.0)
     axes = np.where(has_gloss[..., None], axes, 0.0)
+    coloured = lights.amplitudes
+    if materials.tint is not None:
+        coloured = coloured * materials.tint[material][:, None]
     return (
         axes,
         np.where(has_gloss, sharpness, 0.0),
-        reflected[..., None] * lights.amplitudes,
+        reflected[..., None] * coloured,
         _above(axes, normals),
     )
 
