@@ -7,7 +7,9 @@ it is opened; a folder, a link and a file behind a link are followed as usual.
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 import stat
 from os import PathLike
 from pathlib import Path
@@ -25,6 +27,9 @@ LONGEST_NUMBER = 1000
 """Characters."""
 LARGEST_MEMORY = 1 << 30
 """Bytes that any file may take in memory; large ones may take more, by their own size."""
+
+_INFINITE = re.compile(r"[-+]?1\.#INF0*")
+_NO_NUMBER = re.compile(r"[-+]?(1\.#(IND|QNAN|SNAN)0*|s?nan\(\w*\))", re.IGNORECASE)
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
@@ -99,11 +104,20 @@ def check_memory(
 
 
 def number(word: str | bytes) -> float:
-    """A number in text; raises ValueError for what is none or is written with thousands of
-    characters, which Python would take minutes for."""
+    """A number in text, also what is none as C libraries write it ("1.#QNAN", "-nan(ind)");
+    raises ValueError for other words and for a number written with thousands of characters, which
+    Python would take minutes for."""
     if len(word) > LONGEST_NUMBER:
         raise ValueError(f"a number of at most {LONGEST_NUMBER} characters")
-    return float(word)
+    try:
+        return float(word)
+    except ValueError:
+        text = word if isinstance(word, str) else word.decode("ascii", "replace")
+        if _INFINITE.fullmatch(text):
+            return -math.inf if text.startswith("-") else math.inf
+        if _NO_NUMBER.fullmatch(text):
+            return math.nan
+        raise
 
 
 def parsed_json(text: bytes) -> Any:

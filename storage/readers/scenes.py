@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.companions import file_beside
 from storage.readers.glb_files import GlbFile, read_glb
-from storage.readers.meshes import check_polygons, mesh_format, split_by_uv
+from storage.readers.meshes import mesh_format, read_polygons, split_by_uv
 from storage.readers.obj_files import ObjFile, read_obj
 from storage.readers.opening import number, whole_file
-from storage.readers.ply_files import read_ply
 from storage.readers.polygons import PolygonMesh, triangulate
+from storage.readers.usable_polygons import usable_polygons
 
 LEAST_ROUGHNESS = 1e-3
 """Mirrors, whose slope would be 0, are read as this rough."""
@@ -92,14 +92,14 @@ def read_scene(path: str | PathLike[str]) -> SceneFile:
     """
     file = Path(path)
     found = mesh_format(file)
-    if found == "glb":
+    if found == "gltf":
         glb = read_glb(file)
         mesh, (rows, materials, notes) = glb.mesh, _glb_materials(file, glb)
     elif found == "obj":
         obj = read_obj(file)
         mesh, (rows, materials, notes) = obj.mesh, _obj_materials(file, obj)
     else:
-        mesh = read_ply(file)
+        mesh = read_polygons(file)
         rows, materials, notes = np.zeros(1, np.int64), [default_material()], []
     return _scene(file, mesh, rows, materials, notes)
 
@@ -113,11 +113,13 @@ def _scene(
 ) -> SceneFile:
     """``rows`` (parts of the mesh,): the row of ``materials`` of each."""
     mesh = mesh._replace(corner_uvs=None)  # not used: these may be wrong
-    check_polygons(file, mesh)
+    mesh = usable_polygons(file, mesh)
     triangles, owners = triangulate(mesh.positions, mesh.sizes, mesh.corners)
     parts = np.zeros(len(mesh.sizes), np.int64) if mesh.parts is None else mesh.parts
     vertices, triangles, _ = split_by_uv(mesh, triangles)
-    printable = ("".join(c if c.isprintable() else "?" for c in note) for note in notes)
+    printable = (
+        "".join(c if c.isprintable() else "?" for c in note) for note in (*mesh.notes, *notes)
+    )
     part = rows[parts[owners]].astype(np.int32)
     return SceneFile(vertices, triangles, part, tuple(materials), tuple(printable))
 

@@ -77,11 +77,12 @@ def test_a_ply_is_one_part(tmp_path: Path) -> None:
     np.testing.assert_array_equal(scene.vertices[scene.triangles], mesh.vertices[mesh.triangles])
 
 
-def test_degenerate_faces_stay(tmp_path: Path) -> None:
+def test_faces_of_repeated_corners_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "flat.ply").write_text(ply_text(None, "3 0 1 1\n4 0 0 0 1\n3 0 1 2\n"))
     scene = read_scene(tmp_path / "flat.ply")
-    assert len(scene.triangles) == 4
+    assert len(scene.triangles) == 1
     np.testing.assert_array_equal(scene.vertices[:, 2], 5)
+    assert "2 faces of less than three corners left out." in scene.notes
 
 
 def test_texture_coordinates_do_not_matter(tmp_path: Path) -> None:
