@@ -1,8 +1,8 @@
-"""What a file refers to and cannot do without: an OBJ's material libraries, their textures.
+"""What a file refers to and cannot do without: an OBJ's material libraries, a glTF's buffers.
 
 References are resolved as the reader of scenes does: from the folder of the file that has them,
 else beside it by their last name, as files travel without their folders. One that is absolute, or
-leads upwards, is followed where there is such a file. GLB files hold what they need themselves.
+leads upwards, is followed where there is such a file.
 """
 
 from __future__ import annotations
@@ -14,7 +14,13 @@ from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 
+from storage.readers.bad_input import BadInput
+from storage.readers.gltf.container import referred_uris, spellings
+from storage.readers.references import file_beside
+
 _TEXTURES = re.compile(r"(map_\w+|bump|disp|decal|refl|norm)", re.IGNORECASE)
+_GLTF = (".gltf", ".glb")
+_ENDINGS = (".obj", ".mtl", ".ply", *_GLTF)
 _LONGEST_HEADER = 1 << 20
 """Bytes of a PLY's header, at most."""
 
@@ -23,8 +29,9 @@ def companions(path: str | PathLike[str]) -> list[Path]:
     """The files that a file refers to, and those that these refer to: those that are there.
 
     OBJ: the files of its ``mtllib`` lines, and the textures (``map_Kd`` …) that these name; PLY:
-    what ``comment TextureFile`` names; of other formats none. Absolute paths, each once, in the
-    order of reference. Raises nothing: what is missing or cannot be read is the reader's to judge.
+    what ``comment TextureFile`` names; glTF and GLB: the files of buffers and images; of other
+    formats none. Absolute paths, each once, in the order of reference. Raises nothing: what is
+    missing or cannot be read is the reader's to judge.
 
     >>> companions("nobody.obj")
     []
@@ -51,19 +58,24 @@ def travel_name(file: Path, companion: Path) -> str:
 
 def _referred(file: Path, ending: str) -> list[Path]:
     """The files that a file itself names and that are there."""
-    if ending not in (".obj", ".mtl", ".ply") or not os.path.isfile(file):  # a pipe would block
+    if ending not in _ENDINGS or not os.path.isfile(file):  # a pipe would block
         return []
     try:
         status = file.stat()
         lines = _references(file, ending, status.st_size, status.st_mtime_ns)
-    except OSError:
+    except (OSError, BadInput):
         return []
+    if ending in _GLTF:
+        uris = [map(functools.partial(file_beside, file), spellings(uri)) for (uri,) in lines]
+        return [there for places in uris for there in places if there is not None]
     return [found for words in lines for found in _located(file, words, several=ending == ".obj")]
 
 
 @functools.lru_cache(maxsize=256)
 def _references(file: Path, ending: str, size: int, changed: int) -> list[tuple[str, ...]]:
     """The words of each line that refers to files; read once for each state of the file."""
+    if ending in _GLTF:
+        return [(uri,) for uri in referred_uris(file)]
     if ending == ".ply":
         with file.open("rb") as stream:
             header = stream.read(_LONGEST_HEADER).partition(b"end_header")[0]
@@ -100,13 +112,3 @@ def _located(file: Path, words: tuple[str, ...], *, several: bool) -> list[Path]
         return [there for word in words if (there := file_beside(file, word)) is not None]
     tails = (file_beside(file, " ".join(words[start:])) for start in range(1, len(words)))
     return [there for there in tails if there is not None][:1]
-
-
-def file_beside(file: Path, name: str) -> Path | None:
-    """Where a reference leads: from the file's folder, or to a file beside it."""
-    relative = name.replace("\\", "/")
-    for candidate in (relative, relative.rpartition("/")[2]):
-        there = os.path.normpath(file.parent / candidate)
-        if os.path.isfile(there):  # False, unlike Path's, for names too long to be one
-            return Path(there)
-    return None

@@ -1,0 +1,68 @@
+"""What a glTF's geometry would take: a file of a megabyte can place a thousand copies of a mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from storage.readers.gltf.accessors import Accessors
+from storage.readers.gltf.document import DRACO, MESHOPT
+from storage.readers.gltf.primitives import FAN, STRIP, is_surface, joint_sets, uv_sets
+from storage.readers.gltf.scene_tree import Group, instance_count
+from storage.readers.opening import check_memory
+
+_VERTEX_BYTES, _CORNER_BYTES = 80, 110  # of what is placed, measured up to its triangles
+_SET_BYTES = 64  # of each corner's texture coordinates, or colour
+_READ_BYTES = 64  # of each vertex, for each morph target and each set of joints
+_PRIMITIVE_BYTES = 20_000  # it takes a fifth of a millisecond; what is many takes memory, too
+_INSTANCE_BYTES = 500
+_MEMORY_PER_BYTE = 64  # plain files take 40 at most
+
+
+def check_sizes(document: dict[str, Any], accessors: Accessors, groups: list[Group]) -> None:
+    """Raise BadInput where the groups' meshes, once for each place, take more than the file may."""
+    views = document.get("bufferViews", ())
+    packed = [
+        extensions[name]
+        for extensions in (view.get("extensions", {}) for view in views)
+        for name in MESHOPT
+        if name in extensions
+    ]
+    needed = sum(2 * view["count"] * view["byteStride"] for view in packed)
+    corners = instances = 0
+    sets: set[int] = set()
+    for group in groups:
+        places = sum(instance_count(document, accessors, node) for node in group.nodes)
+        places = 1 if group.skin is not None else places
+        instances += places
+        for primitive in document["meshes"][group.mesh]["primitives"]:
+            if is_surface(primitive):
+                vertices, its_corners = _size(primitive, accessors)
+                needed += _PRIMITIVE_BYTES + _reading(primitive, vertices, group)
+                needed += (places + 1) * _VERTEX_BYTES * vertices
+                needed += (places + 1) * _CORNER_BYTES * its_corners
+                corners += places * its_corners
+                sets.update(uv_sets(primitive))
+                sets.update({-1} if "COLOR_0" in primitive["attributes"] else ())
+    needed += _INSTANCE_BYTES * instances + _SET_BYTES * len(sets) * corners
+    file, file_bytes = accessors.buffers.file, accessors.buffers.file_bytes()
+    found = f"{len(groups)} meshes in {instances} places"
+    check_memory(file, "geometry", found, needed, file_bytes, _MEMORY_PER_BYTE)
+
+
+def _size(primitive: dict[str, Any], accessors: Accessors) -> tuple[int, int]:
+    """Vertices and corners of triangles."""
+    vertices = accessors.count(primitive["attributes"]["POSITION"])
+    corners = accessors.count(primitive["indices"]) if "indices" in primitive else vertices
+    if primitive.get("mode") in (STRIP, FAN):  # a triangle for each corner
+        corners *= 3
+    if DRACO in primitive.get("extensions", {}):  # what has seams is split by its decoder
+        vertices = max(vertices, corners)
+    return vertices, corners
+
+
+def _reading(primitive: dict[str, Any], vertices: int, group: Group) -> int:
+    """Bytes that are read and summed up before anything is placed."""
+    targets = zip(primitive.get("targets", ()), group.weights, strict=False)
+    active = sum(len(target) for target, weight in targets if weight)
+    joints = len(joint_sets(primitive)) if group.skin is not None else 0
+    return _READ_BYTES * vertices * (active + 4 * joints + len(uv_sets(primitive)))
