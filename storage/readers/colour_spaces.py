@@ -104,10 +104,11 @@ def _words(name: str) -> str:
 def _space(name: str, given: NDArray[np.float64]) -> ColourSpace:
     if name == "sRGB":
         return LINEAR_SRGB
-    to_srgb = np.linalg.inv(_to_xyz(np.array(SRGB)))
+    to_srgb: NDArray[np.float64] = np.linalg.inv(_to_xyz(np.array(SRGB)))
     if name == "CIE XYZ":
         return ColourSpace(name, to_srgb)
-    return ColourSpace(name, to_srgb @ _adaptation(given[6:], np.array(_D65)) @ _to_xyz(given))
+    adapted = _adaptation(given[6:], np.array(_D65)) @ _to_xyz(given)
+    return ColourSpace(name, np.asarray(to_srgb @ adapted, np.float64))
 
 
 def _to_xyz(chromaticities: NDArray[np.float64]) -> NDArray[np.float64]:

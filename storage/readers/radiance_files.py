@@ -3,10 +3,9 @@
 Written after Ward's "Radiance File Formats" and the resolution lines of Radiance's ``resolu.h``:
 true x grows to the right, true y upwards; the resolution line names the slow axis first, each
 axis with the sign of its growth in the file. ``-Y 256 +X 256`` is the order of text; ATRIUM's
-``+X 256 -Y 256`` is column after column, each from the top. OpenCV knows the first line only, so
-it gets the pixels under a plain header, and the array is turned here.
+``+X 256 -Y 256`` is column after column, each from the top.
 
-OpenCV takes a pixel's mantissas as they are (Radiance itself adds half a step, less than 0.4 %).
+A pixel's mantissas are taken as they are (Radiance itself adds half a step, less than 0.4 %).
 """
 
 from __future__ import annotations
@@ -19,72 +18,92 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
+from storage.readers.colour_spaces import CIE_XYZ, LINEAR_SRGB, ColourSpace, named_space, space_of
+from storage.readers.opening import number
 
 SIGNATURE = b"#?"
 
-_RESOLUTION = re.compile(rb"([+-])([XY]) (\d{1,6}) ([+-])([XY]) (\d{1,6})\s*")
-_RGBE = b"32-bit_rle_rgbe"
-_SRGB_PRIMARIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_RESOLUTION = re.compile(rb"\s*([+-])([XY])\s+(\d{1,6})\s+([+-])([XY])\s+(\d{1,6})\s*")
+_MOST_LINES = 10_000
+_FORMATS = {b"32-bit_rle_rgbe": LINEAR_SRGB, b"32-bit_rle_xyze": CIE_XYZ}
+_DIVISORS = {b"EXPOSURE": 1, b"COLORCORR": 3}
 
 
 class RadianceHeader(NamedTuple):
-    """Upright size, what to divide by, and how the pixels are stored.
+    """Upright size, what the values mean, and how the pixels are stored.
 
-    ``exposure``: per channel. ``columns``: scanlines are columns. ``mirrored``, ``upside_down``:
-    x falls, y grows in the file. ``pixels_at``: where in the file they begin.
+    ``exposure``: per channel, to divide by. ``gamma``: the power that makes values linear.
+    ``space``: of the colours. ``columns``: scanlines are columns. ``mirrored``, ``upside_down``:
+    x falls, y grows in the file. ``pixels_at``: where in the file they begin. ``notes``: sentences
+    on what is converted or left out.
     """
 
     width: int
     height: int
     exposure: tuple[float, float, float]
+    gamma: float
+    space: ColourSpace
     columns: bool
     mirrored: bool
     upside_down: bool
     pixels_at: int
+    notes: tuple[str, ...]
 
 
 def radiance_header(file: Path, data: bytes) -> RadianceHeader:
     """Read a header from a file's first bytes.
 
-    Raises IndexError where it does not end in them, BadInput where the pixels are not RGB or the
-    size is not understood.
+    Raises IndexError where it does not end in them, BadInput where the pixels are none of RGB or
+    XYZ, the primaries span no space or the size is not understood.
     """
-    exposure = np.ones(3)
-    at = 0
-    while True:
-        line, at = _line(data, at)
-        if not line.strip():
-            break
-        key, _, value = line.partition(b"=")
-        if key == b"FORMAT" and value.strip() != _RGBE:
-            raise BadInput(file, "FORMAT", _text(value), _RGBE.decode())
-        if key == b"EXPOSURE":
-            exposure *= _positive_numbers(file, key, value, 1)
-        if key == b"COLORCORR":
-            exposure *= _positive_numbers(file, key, value, 3)
-        if key == b"PRIMARIES":
-            _check_primaries(file, value)
-    line, at = _line(data, at)
+    fields, line, at = _fields(data)
     match = _RESOLUTION.fullmatch(line)
     if match is None or match[2] == match[5]:
         raise BadInput(file, "resolution line", repr(_text(line)), "one like -Y 256 +X 256")
+    exposure, notes = np.ones(3), []
+    gamma, space, primaries = 1.0, LINEAR_SRGB, LINEAR_SRGB
+    for key, value in fields:
+        if key in _DIVISORS:
+            divisor = _positive_numbers(value, _DIVISORS[key])
+            if divisor is None:
+                notes.append(f"{key.decode()}={_text(value)!r} is nothing to divide by: left out.")
+            else:
+                exposure *= divisor
+        elif key == b"GAMMA":
+            given = _positive_numbers(value, 1)
+            gamma = 1.0 if given is None else float(given[0])
+        elif key == b"PRIMARIES":
+            primaries = _primaries(file, value)
+        elif key == b"FORMAT":
+            if value not in _FORMATS:
+                expected = " or ".join(name.decode() for name in _FORMATS)
+                raise BadInput(file, "FORMAT", _text(value), f"{expected}: save it as one of them")
+            space = _FORMATS[value]
+    if space is LINEAR_SRGB:
+        space = primaries
+    if gamma != 1:
+        notes.append(f"The values were raised to the power of {gamma:g}, the header's gamma.")
     signs = {match[2]: match[1], match[5]: match[4]}
     sizes = {match[2]: int(match[3]), match[5]: int(match[6])}
     return RadianceHeader(
         width=sizes[b"X"],
         height=sizes[b"Y"],
         exposure=(float(exposure[0]), float(exposure[1]), float(exposure[2])),
+        gamma=gamma,
+        space=space,
         columns=match[2] == b"X",
         mirrored=signs[b"X"] == b"-",
         upside_down=signs[b"Y"] == b"+",
         pixels_at=at,
+        notes=(*notes, *space.notes),
     )
 
 
 def radiance_pixels(file: Path, data: bytes) -> NDArray[np.float32]:
-    """Decode a whole picture: (y, x, 3) float32 linear RGB, the top row first.
+    """Decode a whole picture: (y, x, 3) float32 linear sRGB, the top row first.
 
-    Exposures are divided out. Raises BadInput for truncated or damaged content.
+    Exposures are divided out, other colours converted, as the header's ``notes`` say; colours
+    outside sRGB are negative. Raises BadInput for truncated or damaged content.
     """
     try:
         header = radiance_header(file, data)
@@ -93,21 +112,38 @@ def radiance_pixels(file: Path, data: bytes) -> NDArray[np.float32]:
     lines, length = header.height, header.width
     if header.columns:
         lines, length = length, lines
-    stored = data[header.pixels_at :]
-    if _run_lengths(stored, length):
-        light = _decoded_by_opencv(file, stored, lines, length)
-    else:
-        light = _decoded_flat(file, stored, lines, length)
+    light = _light(_rgbe(file, data, header.pixels_at, lines, length))
     if header.columns:
         light = light.swapaxes(0, 1)
     if header.mirrored:
         light = light[:, ::-1]
     if header.upside_down:
         light = light[::-1]
-    if header.exposure != (1.0, 1.0, 1.0):
-        with np.errstate(over="ignore"):
+    with np.errstate(over="ignore"):
+        if header.exposure != (1.0, 1.0, 1.0):
             light = (light / np.array(header.exposure)).astype(np.float32)
-    return light
+        if header.gamma != 1:
+            light = light ** np.float32(header.gamma)
+    converted: NDArray[np.float32] = header.space.converted(light)
+    return converted
+
+
+def _fields(data: bytes) -> tuple[list[tuple[bytes, bytes]], bytes, int]:
+    """Keys and values, the resolution line, and where the pixels begin.
+
+    The empty line between may be missing, or be several.
+    """
+    fields: list[tuple[bytes, bytes]] = []
+    at = 0
+    ended = False
+    for _ in range(_MOST_LINES):
+        line, at = _line(data, at)
+        if (ended and line.strip()) or _RESOLUTION.fullmatch(line):
+            return fields, line, at
+        ended = ended or not line.strip()
+        key, _, value = line.partition(b"=")
+        fields.append((key.strip(), value.strip()))
+    raise IndexError("the header does not end")
 
 
 def _line(data: bytes, at: int) -> tuple[bytes, int]:
@@ -118,62 +154,51 @@ def _line(data: bytes, at: int) -> tuple[bytes, int]:
 
 
 def _text(value: bytes) -> str:
-    return value.decode("ascii", "replace").strip()
+    return value.decode("ascii", "replace").strip()[:60]
 
 
-def _positive_numbers(file: Path, key: bytes, value: bytes, count: int) -> NDArray[np.float64]:
-    try:
-        numbers = np.array([float(word) for word in value.split()])
-    except ValueError:
-        numbers = np.array([])
+def _positive_numbers(value: bytes, count: int) -> NDArray[np.float64] | None:
+    numbers = _numbers(value)
     if len(numbers) != count or not (np.isfinite(numbers) & (numbers > 0)).all():
-        expected = "a positive number" if count == 1 else f"{count} positive numbers"
-        raise BadInput(file, key.decode(), repr(_text(value)), expected)
+        return None
     return numbers
 
 
-def _check_primaries(file: Path, value: bytes) -> None:
-    """A header without the line is taken as sRGB: that is what photographs' HDR software means."""
+def _numbers(value: bytes) -> NDArray[np.float64]:
     try:
-        primaries = [float(word) for word in value.split()]
+        return np.array([number(word) for word in value.split()])
     except ValueError:
-        primaries = []
-    if len(primaries) != 8 or not np.allclose(primaries, _SRGB_PRIMARIES, atol=2e-3):
-        raise BadInput(file, "PRIMARIES", repr(_text(value)), "those of sRGB")
+        return np.array([])
 
 
-def _run_lengths(stored: bytes, length: int) -> bool:
-    """Whether scanlines are run-length encoded by channel: each begins 2, 2, its length."""
-    return 8 <= length < 32768 and stored[:4] == bytes([2, 2, length >> 8, length & 255])
-
-
-def _decoded_by_opencv(file: Path, stored: bytes, lines: int, length: int) -> NDArray[np.float32]:
-    import cv2
-
-    plain = b"#?RADIANCE\nFORMAT=%s\n\n-Y %d +X %d\n" % (_RGBE, lines, length)
+def _primaries(file: Path, value: bytes) -> ColourSpace:
+    """A header without the line is taken as sRGB: that is what photographs' HDR software means."""
+    space = named_space(_text(value))
     try:
-        light = cv2.imdecode(np.frombuffer(plain + stored, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        light = None
-    if light is None or light.shape != (lines, length, 3) or light.dtype != np.float32:
+        return space or space_of(_numbers(value).tolist())
+    except ValueError:
+        expected = "red, green, blue and white, x and y of each (without the line it is sRGB)"
+        raise BadInput(file, "PRIMARIES", repr(_text(value)), expected) from None
+
+
+def _rgbe(file: Path, data: bytes, at: int, lines: int, length: int) -> NDArray[np.uint8]:
+    from storage.readers.radiance_runs import decoded_lines
+
+    stored = np.frombuffer(data, np.uint8, offset=at)
+    by_channel = bytes([2, 2, length >> 8 & 255, length & 255])
+    if len(stored) == 4 * lines * length and data[at : at + 4] != by_channel:
+        return stored.reshape(lines, length, 4)  # whatever pixels look like runs
+    pixels = decoded_lines(stored, lines, length)
+    if pixels is None:
         raise _damaged(file)
-    return np.asarray(light, dtype=np.float32)[..., ::-1]  # OpenCV's channels are BGR
+    return pixels
 
 
-def _decoded_flat(file: Path, stored: bytes, lines: int, length: int) -> NDArray[np.float32]:
-    if len(stored) != 4 * lines * length:
-        # Radiance's first run-length code (before 1991) ends up here as well.
-        raise BadInput(
-            file,
-            "content",
-            f"{len(stored)} bytes of pixels",
-            f"{4 * lines * length} bytes, or scanlines run-length encoded by channel",
-        )
-    rgbe = np.frombuffer(stored, np.uint8).reshape(lines, length, 4)
-    exponents = rgbe[..., 3:].astype(np.int32)
-    scale = np.ldexp(1.0, exponents - 136) * (exponents > 0)  # exponent 0 is black
-    light: NDArray[np.float32] = (rgbe[..., :3] * scale).astype(np.float32)
-    return light
+def _light(rgbe: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Mantissas are 256ths of two to the exponent's excess over 128; exponent 0 is black."""
+    exponents = np.arange(256)
+    scale = np.where(exponents > 0, np.ldexp(1.0, exponents - 136), 0).astype(np.float32)
+    return rgbe[..., :3] * scale[rgbe[..., 3:]]
 
 
 def _damaged(file: Path) -> BadInput:
