@@ -73,7 +73,7 @@ def run() -> dict[str, Any]:
 
 
 def _photograph(name: str) -> FurPhotograph:
-    return fur_photograph(builtin_photograph(name), tail=TAIL)
+    return fur_photograph(builtin_photograph(name).radiance, tail=TAIL)
 
 
 def _top_view() -> dict[str, Any]:
@@ -132,7 +132,7 @@ def _depth() -> dict[str, Any]:
 
 def _derive() -> dict[str, Any]:
     """A 512 x 512 photograph's luminance to 15 masks; median of 11."""
-    grey = luminance(builtin_photograph("grass"))
+    grey = luminance(builtin_photograph("grass").radiance)
 
     def derive() -> None:
         make_shell_stack(grey, fit_attenuation(grey, tail=TAIL), LAYERS, tails="end layers")
@@ -148,7 +148,7 @@ def _teapot(segments: int) -> ShellMesh:
 
 
 def _ours(photo: FurPhotograph, mesh: ShellMesh, fill: Fill) -> Any:
-    image = fur_texture(*photo, LAYERS, tails="end layers")
+    image = fur_texture(photo, LAYERS, tails="end layers")
     return fur_surface(
         mesh.vertices,
         mesh.normals,
@@ -215,7 +215,7 @@ def _frames() -> dict[str, Any]:
     """Both sides on one stage, frames in turns; the medians' ratio. Their pictures must agree."""
     photo = _photograph("grass")
     mesh = _teapot(33)
-    ours_bytes = fur_texture(*photo, LAYERS, tails="end layers").nbytes
+    ours_bytes = fur_texture(photo, LAYERS, tails="end layers").nbytes
     usual_bytes = sum(image.nbytes for image in _layer_images(photo, "columns"))
     figures: dict[str, Any] = {
         "vertices": len(mesh.normals),

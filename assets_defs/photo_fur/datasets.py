@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.drawing.colour import luminance
 from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
@@ -22,25 +22,46 @@ _PIXELS = ("y", "x")
 
 
 def photograph_dataset(
-    radiance: NDArray[np.float32], name: str, depth: NDArray[np.float32] | None = None
+    radiance: NDArray[np.float32],
+    name: str,
+    *,
+    depth: NDArray[np.float32] | None = None,
+    opaque: NDArray[np.bool_] | None = None,
 ) -> xr.Dataset:
-    """`fur_photo` of a photograph (y, x, 3) and, where it is known, the depth (y, x)."""
+    """`fur_photo` of a photograph (y, x, 3), and (y, x) the depth, where it is known, and where it
+    is opaque, in a cut-out."""
     import xarray as xr
 
-    variables = {
+    variables: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = {
         "radiance": ((*_PIXELS, "channel"), radiance),
         "luminance": (_PIXELS, luminance(radiance)),
     }
     if depth is not None:
         variables["depth"] = (_PIXELS, depth)
+    if opaque is not None:
+        variables["opaque"] = (_PIXELS, opaque)
     return xr.Dataset(variables, attrs={"name": name})
 
 
 def photograph_of(fur_photo: xr.Dataset, attenuation: xr.Dataset) -> FurPhotograph:
     """The photograph with its medium, as it is drawn."""
     return FurPhotograph(
-        fur_photo["radiance"].values, fur_photo["luminance"].values, attenuation_of(attenuation)
+        fur_photo["radiance"].values,
+        fur_photo["luminance"].values,
+        attenuation_of(attenuation),
+        opaque_of(fur_photo),
     )
+
+
+def opaque_of(fur_photo: xr.Dataset) -> NDArray[np.bool_] | None:
+    """(y, x): where a photograph is opaque; None for everywhere."""
+    return fur_photo["opaque"].values if "opaque" in fur_photo else None
+
+
+def seen_of(fur_photo: xr.Dataset, variable: str) -> NDArray[np.floating]:
+    """A variable's values at the opaque pixels: (y, x, …), or (pixels, …) of a cut-out."""
+    values, opaque = fur_photo[variable].values, opaque_of(fur_photo)
+    return values if opaque is None else values[opaque]
 
 
 def attenuation_dataset(

@@ -11,7 +11,7 @@ from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
 from pipelines.photo_fur.attenuation import MOST_LAYERS
 from storage.readers.meshes import read_mesh
-from storage.readers.photographs import BUILTIN_PHOTOGRAPHS, read_photograph
+from storage.readers.photographs import BUILTIN_PHOTOGRAPHS, SUFFIXES, read_photograph
 
 PELT = "pelt"
 SQUARE = "square"
@@ -39,7 +39,7 @@ FUR = System(
             builtin=(*BUILTIN_PHOTOGRAPHS, PELT),
             examples=("grass", PELT),
             default=PELT,
-            suffixes=(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr"),
+            suffixes=SUFFIXES,
             check=_check_photograph,
         ),
         Dimension(

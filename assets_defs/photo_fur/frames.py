@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.photo_fur.datasets import frames_dataset, photograph_of, shell_mesh_of
+from assets_defs.photo_fur.datasets import frames_dataset, opaque_of, photograph_of, shell_mesh_of
 from assets_defs.photo_fur.declaration import FUR, SQUARE
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Pictures, Progress, Result
@@ -54,7 +54,8 @@ def _top_view_rmse(version: StoredVersion) -> float | None:
     if not from_above.any():
         return None
     picture = version.dataset["frames"].values[from_above][0]
-    return figures.top_view_rmse(picture, version.input("fur_photo")["radiance"].values)
+    photo = version.input("fur_photo")
+    return figures.top_view_rmse(picture, photo["radiance"].values, opaque_of(photo))
 
 
 def _least_coverage(version: StoredVersion) -> float:

@@ -11,6 +11,8 @@ from assets_defs.checks import Check
 from assets_defs.photo_fur.datasets import (
     attenuation_dataset,
     attenuation_of,
+    opaque_of,
+    seen_of,
     shell_stack_dataset,
 )
 from assets_defs.photo_fur.declaration import FUR, Layers
@@ -117,7 +119,7 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
     """Imax, Imin, a and the layers' luminances from the photograph's histogram."""
     from pipelines.photo_fur.attenuation import layer_histogram
 
-    luminance = fur_photo["luminance"].values
+    luminance = seen_of(fur_photo, "luminance")
     found = layer_histogram(luminance, tail=settings.tail, layers=settings.layers)
     shown = {
         "Imax": found.attenuation.brightest,
@@ -151,7 +153,8 @@ def _stack_pictures(dataset: xr.Dataset) -> Pictures:
 
 def _partition_error(version: StoredVersion) -> float:
     dataset = version.dataset
-    return figures.partition_error(dataset["layer"].values, dataset["mask"].values)
+    opaque = opaque_of(version.input("fur_photo"))
+    return figures.partition_error(dataset["layer"].values, dataset["mask"].values, opaque)
 
 
 def _interval_error(version: StoredVersion) -> float:
@@ -161,6 +164,7 @@ def _interval_error(version: StoredVersion) -> float:
         version.input("fur_photo")["luminance"].values,
         attenuation_of(version.input("attenuation")).boundaries(settings["layers"]),
         settings["tails"],
+        opaque_of(version.input("fur_photo")),
     )
 
 
@@ -173,7 +177,7 @@ def _interval_error(version: StoredVersion) -> float:
     checks=(
         Check(
             "partition_error",
-            "Share of the pixels that are not in exactly one layer.",
+            "Share of the pixels that are not in exactly one layer, of transparent ones in none.",
             _partition_error,
             at_most=0.0,
         ),
@@ -194,5 +198,6 @@ def shell_stack(settings: StackSettings, fur_photo: xr.Dataset, attenuation: xr.
         attenuation_of(attenuation),
         settings.layers,
         tails=settings.tails,
+        opaque=opaque_of(fur_photo),
     )
     return shell_stack_dataset(stack), {"dropped pixels": int((stack.layer == 0).sum())}

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, ClassVar
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.photo_fur.datasets import photograph_dataset
+from assets_defs.photo_fur.datasets import photograph_dataset, seen_of
 from assets_defs.photo_fur.declaration import FUR, PELT
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.photo_fur import figures
 from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
 
 
 class PhotoSettings(Settings):
@@ -50,16 +48,16 @@ def _pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _contrast(version: StoredVersion) -> float:
-    return figures.contrast(version.dataset["luminance"].values)
+    return figures.contrast(seen_of(version.dataset, "luminance"))
 
 
 def _clipped_share(version: StoredVersion) -> float:
-    return figures.clipped_share(version.dataset["radiance"].values)
+    return figures.clipped_share(seen_of(version.dataset, "radiance"))
 
 
-def _read(source: Source, settings: PhotoSettings) -> NDArray[np.float32]:
-    """A photograph of the user's or a built-in one, exposed and brought to size."""
-    from pipelines.photo_fur.photograph import expose, fit_size
+def _read(source: Source, settings: PhotoSettings) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """A photograph of the user's or a built-in one, exposed and brought to size, with its notes."""
+    from pipelines.photo_fur.photograph import expose, fit_cutout, fit_size
     from storage.readers.photographs import builtin_photograph, read_photograph
 
     raw = (
@@ -67,7 +65,11 @@ def _read(source: Source, settings: PhotoSettings) -> NDArray[np.float32]:
         if source.path is None
         else read_photograph(source.path, settings.crop)
     )
-    return fit_size(expose(raw), settings.largest_side)
+    exposed = expose(raw.radiance, raw.opaque)
+    if raw.opaque is None:
+        return photograph_dataset(fit_size(exposed, settings.largest_side), source.name), raw.notes
+    radiance, opaque = fit_cutout(exposed, raw.opaque, settings.largest_side)
+    return photograph_dataset(radiance, source.name, opaque=opaque), raw.notes
 
 
 @FUR.asset(
@@ -105,7 +107,7 @@ def fur_photo(settings: PhotoSettings, source: Source, progress: Progress) -> Re
             settings.pelt_seed,
             progress=progress,
         )
-        dataset = photograph_dataset(radiance, source.name, depth)
-    else:
-        dataset = photograph_dataset(_read(source, settings), source.name)
-    return dataset, {"pixels": dataset["luminance"].size}
+        dataset = photograph_dataset(radiance, source.name, depth=depth)
+        return dataset, {"pixels": dataset["luminance"].size}
+    dataset, notes = _read(source, settings)
+    return dataset, {"pixels": dataset["luminance"].size, NOTES: notes}

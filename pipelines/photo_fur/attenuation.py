@@ -108,12 +108,18 @@ def fit_attenuation(luminance: NDArray[np.floating], *, tail: float) -> Attenuat
 
 
 def layer_of(
-    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+    luminance: NDArray[np.floating],
+    attenuation: Attenuation,
+    layers: int,
+    *,
+    tails: Tails,
+    opaque: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.uint8]:
     """The layer of every pixel: n where I(n) < I <= I(n-1), 1 at the tips (section 3.2).
 
     Imin itself belongs to the last layer. Pixels outside [Imin, Imax] go to the end layers or
-    are dropped (0). Raises ValueError for a number of layers that cannot be drawn.
+    are dropped (0), as all are that are not ``opaque``. Raises ValueError for a number of layers
+    that cannot be drawn.
 
     >>> import numpy as np
     >>> luminance = np.array([[0.9, 0.8, 0.3, 0.1]])
@@ -126,6 +132,8 @@ def layer_of(
     if tails == "dropped":
         outside = (luminance > attenuation.brightest) | (luminance < attenuation.darkest)
         layer = np.where(outside, 0, layer)
+    if opaque is not None:
+        layer = np.where(opaque, layer, 0)
     return layer.astype(np.uint8)
 
 
@@ -144,11 +152,17 @@ class ShellStack(NamedTuple):
 
 
 def make_shell_stack(
-    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+    luminance: NDArray[np.floating],
+    attenuation: Attenuation,
+    layers: int,
+    *,
+    tails: Tails,
+    opaque: NDArray[np.bool_] | None = None,
 ) -> ShellStack:
     """The layer of every pixel of a photograph (y, x), and the layers' masks (section 3.2).
 
-    Raises ValueError for a number of layers that cannot be drawn.
+    Pixels that are not ``opaque`` are in none. Raises ValueError for a number of layers that cannot
+    be drawn.
 
     >>> import numpy as np
     >>> luminance = np.array([[0.9, 0.6], [0.3, 0.2]])
@@ -156,7 +170,7 @@ def make_shell_stack(
     >>> stack.layer.tolist(), stack.masks.shape
     ([[1, 1], [3, 3]], (3, 2, 2))
     """
-    layer = layer_of(luminance, attenuation, layers, tails=tails)
+    layer = layer_of(luminance, attenuation, layers, tails=tails, opaque=opaque)
     return ShellStack(layer, layer_masks(layer, layers))
 
 
@@ -204,13 +218,19 @@ def code_steps(layers: int) -> int:
 
 
 def depth_code(
-    luminance: NDArray[np.floating], attenuation: Attenuation, layers: int, *, tails: Tails
+    luminance: NDArray[np.floating],
+    attenuation: Attenuation,
+    layers: int,
+    *,
+    tails: Tails,
+    opaque: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.uint8]:
     """Depth in 8 bits for the shader: layer n has the codes (n-1) s … n s - 1, s = code_steps.
 
     The steps divide the layers evenly, so comparing codes is exactly the comparison of the full
     luminance with I(n-1) and I(n), and the code still grows evenly with the depth, so filtering it
-    makes sense. Raises ValueError for a number of layers that cannot be drawn.
+    makes sense. No layer shows what is not ``opaque``. Raises ValueError for a number of layers
+    that cannot be drawn.
 
     >>> import numpy as np
     >>> luminance = np.array([[0.8, 0.4, 0.2, 0.1]])
@@ -218,7 +238,7 @@ def depth_code(
     [[0, 127, 253, 255]]
     """
     steps = code_steps(layers)
-    layer = layer_of(luminance, attenuation, layers, tails=tails)
+    layer = layer_of(luminance, attenuation, layers, tails=tails, opaque=opaque)
     with np.errstate(divide="ignore"):
         depth = np.log(attenuation.brightest / luminance) / attenuation.coefficient
     within = np.clip(depth * layers - (layer - 1.0), 0.0, 1.0)

@@ -46,11 +46,18 @@ def estimated_depth(
     return np.log(attenuation.brightest / inside) / attenuation.coefficient
 
 
-def partition_error(layer: NDArray[np.uint8], masks: NDArray[np.bool_]) -> float:
-    """Share of the pixels whose masks do not say once, and only once, what ``layer`` says."""
+def partition_error(
+    layer: NDArray[np.uint8],
+    masks: NDArray[np.bool_],
+    opaque: NDArray[np.bool_] | None = None,
+) -> float:
+    """Share of the pixels whose masks do not say once, and only once, what ``layer`` says; those
+    that are not ``opaque`` have to be in none."""
     times = masks.sum(axis=0)
     first = masks.argmax(axis=0) + 1
     wrong = np.where(layer == 0, times != 0, (times != 1) | (first != layer))
+    if opaque is not None:
+        wrong |= ~opaque & (times != 0)
     return float(wrong.mean())
 
 
@@ -59,8 +66,10 @@ def interval_error(
     luminance: NDArray[np.floating],
     boundaries: NDArray[np.float64],
     tails: Tails,
+    opaque: NDArray[np.bool_] | None = None,
 ) -> float:
-    """Share of the pixels outside their layer's interval of luminance (section 3.2)."""
+    """Share of the pixels outside their layer's interval of luminance (section 3.2); those that
+    are not ``opaque`` have no layer."""
     bounds = boundaries.copy()
     if tails == "end layers":
         bounds[0], bounds[-1] = np.inf, -np.inf
@@ -68,7 +77,10 @@ def interval_error(
     at_the_skin = (layer == len(bounds) - 1) & (luminance == below)
     inside = (luminance <= above) & ((luminance > below) | at_the_skin)
     outside = (luminance > bounds[0]) | (luminance < bounds[-1])
-    return float(np.where(layer == 0, ~outside, ~inside).mean())
+    wrong = np.where(layer == 0, ~outside, ~inside)
+    if opaque is not None:
+        wrong = np.where(opaque, wrong, layer != 0)
+    return float(wrong.mean())
 
 
 def step_error(
@@ -81,14 +93,21 @@ def step_error(
     return float(np.linalg.norm(shells - expected, axis=-1).max() / thickness)
 
 
-def top_view_rmse(picture: NDArray[np.uint8], radiance: NDArray[np.floating]) -> float:
+def top_view_rmse(
+    picture: NDArray[np.uint8],
+    radiance: NDArray[np.floating],
+    opaque: NDArray[np.bool_] | None = None,
+) -> float:
     """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB.
 
-    The picture has one pixel a texel, or a square of pixels each.
+    The picture has one pixel a texel, or a square of pixels each. Where the photograph is not
+    ``opaque`` the picture shows what is behind the fur, which is not looked at.
     """
     times = len(picture) // len(radiance)
     expected = to_8bit(radiance).repeat(times, axis=0).repeat(times, axis=1)
     step = picture.astype(np.float64) - expected
+    if opaque is not None:
+        step = step[opaque.repeat(times, axis=0).repeat(times, axis=1)]
     return float(np.sqrt(np.mean((step / 255.0) ** 2)))
 
 

@@ -64,7 +64,7 @@ def draw_frames(
     samples along each side of a pixel; ``progress`` is called with the fraction done. Raises
     ``drawing.stage.NoGraphicsError`` where nothing can be drawn.
     """
-    image = fur_texture(*photograph, mesh.layers, tails=tails)
+    image = fur_texture(photograph, mesh.layers, tails=tails)
     height, width = size
     cameras = _cameras(views, mesh.vertices.reshape(-1, 3), width / height)
     pictures, coverage = [], []

@@ -22,6 +22,8 @@ class FurPhotograph(NamedTuple):
     luminance: NDArray[np.floating]
     """(y, x), linear."""
     attenuation: Attenuation
+    opaque: NDArray[np.bool_] | None = None
+    """(y, x): where there is fur; None for everywhere."""
 
 
 def fur_photograph(radiance: NDArray[np.floating], *, tail: float = 0.005) -> FurPhotograph:
@@ -40,11 +42,14 @@ def fur_photograph(radiance: NDArray[np.floating], *, tail: float = 0.005) -> Fu
     return FurPhotograph(radiance, grey, fit_attenuation(grey, tail=tail))
 
 
-def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
+def expose(
+    radiance: NDArray[np.floating], opaque: NDArray[np.bool_] | None = None
+) -> NDArray[np.float32]:
     """Linear radiance scaled into [0, 1]; a photograph that already lies there stays as it is.
 
     White is the radiance that only HIGHLIGHT_SHARE of the values exceed, but never below 1: an
-    HDR photograph is darkened where it must be, not brightened.
+    HDR photograph is darkened where it must be, not brightened. Pixels (y, x) that are not
+    ``opaque`` have no say.
 
     >>> import numpy as np
     >>> expose(np.array([[[0.25, 0.5, 0.75]]])).tolist()  # inside [0, 1]: as it is
@@ -52,7 +57,8 @@ def expose(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
     >>> expose(np.full((2, 2, 3), 4.0)).ravel().tolist() == [1.0] * 12
     True
     """
-    white = max(1.0, float(np.quantile(radiance, 1.0 - HIGHLIGHT_SHARE)))
+    seen = radiance if opaque is None else radiance[opaque]
+    white = max(1.0, float(np.quantile(seen, 1.0 - HIGHLIGHT_SHARE)))
     return np.clip(radiance / white, 0.0, 1.0).astype(np.float32)
 
 
@@ -66,3 +72,23 @@ def fit_size(radiance: NDArray[np.floating], largest_side: int) -> NDArray[np.fl
         return radiance.astype(np.float32)
     shape = (max(1, round(height * scale)), max(1, round(width * scale)), channels)
     return resize_local_mean(radiance, shape, channel_axis=2).astype(np.float32)
+
+
+def fit_cutout(
+    radiance: NDArray[np.floating], opaque: NDArray[np.bool_], largest_side: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The opaque pixels averaged down as ``fit_size`` does; what is half opaque stays so.
+
+    Returns the radiance, 0 where it is transparent, and where it is opaque.
+
+    >>> import numpy as np
+    >>> opaque = np.array([[True, True, True, False], [True, True, False, False]])
+    >>> light, left = fit_cutout(np.full((2, 4, 3), 0.6), opaque, 2)
+    >>> left.tolist(), (light[..., 0] * 10).round().tolist()
+    ([[True, False]], [[6.0, 0.0]])
+    """
+    seen = np.where(opaque[..., None], radiance, 0).astype(np.float32)
+    share = fit_size(opaque[..., None].astype(np.float32), largest_side)
+    light = fit_size(seen, largest_side)
+    left = share[..., 0] >= 0.5
+    return np.where(left[..., None], light / np.maximum(share, 0.5), 0).astype(np.float32), left

@@ -21,21 +21,27 @@ from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
+from pipelines.photo_fur.photograph import FurPhotograph
 
 Fill = Literal["columns", "bands"]
 
 
-def fur_texture(
-    radiance: NDArray[np.floating],
-    luminance: NDArray[np.floating],
-    attenuation: Attenuation,
-    layers: int,
-    *,
-    tails: Tails,
-) -> NDArray[np.uint8]:
-    """The photograph as it is uploaded, (y, x, 4): 8-bit sRGB and the depth code in alpha."""
-    code = depth_code(luminance, attenuation, layers, tails=tails)
-    return np.dstack([to_8bit(radiance), code])
+def fur_texture(photograph: FurPhotograph, layers: int, *, tails: Tails) -> NDArray[np.uint8]:
+    """The photograph as it is uploaded, (y, x, 4): 8-bit sRGB and the depth code in alpha.
+
+    A transparent pixel has the colour of the nearest opaque one: the filter mixes it into the rim.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    opaque = photograph.opaque
+    code = depth_code(
+        photograph.luminance, photograph.attenuation, layers, tails=tails, opaque=opaque
+    )
+    colours = to_8bit(photograph.radiance)
+    if opaque is not None:
+        nearest = distance_transform_edt(~opaque, return_distances=False, return_indices=True)
+        colours = colours[tuple(nearest)]
+    return np.dstack([colours, code])
 
 
 def fur_surface(

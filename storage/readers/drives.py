@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
+from storage.readers.code_points import srgb_of_light
 from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown_number
 from storage.readers.image_decoding import decode_image
 from storage.readers.opening import check_file, check_memory, first_bytes
@@ -292,8 +293,8 @@ def _picture(
     if image.opaque is not None and not image.opaque.all():
         holes = image.opaque.size - np.count_nonzero(image.opaque)
         raise BadInput(file, "alpha", f"less than opaque in {holes} pixel(s)", "an opaque picture")
-    if codes.dtype.kind != "u":  # a TIFF or EXR that took the place of what was checked
-        raise BadInput(file, "format", "floats", _PHOTOGRAPH)
+    if codes.dtype.kind == "f":  # colours with a profile other than sRGB's
+        codes = np.rint(65535 * srgb_of_light(codes)).astype(np.uint16)
     if distortion.any():
         import cv2
 

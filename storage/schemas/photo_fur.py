@@ -17,6 +17,13 @@ FUR_PHOTO = Schema(
         "luminance": Variable(
             _PIXELS, "float32", "1", "Rec. 709 luminance of the radiance", "section 3.1, I"
         ),
+        "opaque": Variable(
+            _PIXELS,
+            "bool",
+            "1",
+            "Where there is fur, in a cut-out; radiance is 0 where there is none",
+            optional=True,
+        ),
         "depth": Variable(
             _PIXELS,
             "float32",

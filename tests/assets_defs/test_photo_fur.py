@@ -139,13 +139,13 @@ def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -
 
 REGRESSIONS = (
     Regression(
-        "contrast", photograph, "expose", lambda right, photo: right(photo) * 0.05 + 0.5, KEYS
+        "contrast", photograph, "expose", lambda right, *photo: right(*photo) * 0.05 + 0.5, KEYS
     ),
     Regression(
         "clipped_share",
         photograph,
         "expose",
-        lambda right, photo: np.clip(right(photo) * 6, 0, 1),
+        lambda right, *photo: np.clip(right(*photo) * 6, 0, 1),
         KEYS,
     ),
     Regression(

@@ -86,7 +86,7 @@ def fur(
     shells = shell_vertices(skin.vertices, skin.normals, THICKNESS, layers)
     if only is not None:
         shells[np.arange(1, layers + 1) != only] += np.float32([50, 0, 0])
-    image = fur_texture(photo.radiance, photo.luminance, photo.attenuation, layers, tails=tails)
+    image = fur_texture(photo, layers, tails=tails)
     return fur_surface(
         shells,
         skin.normals,
@@ -239,7 +239,7 @@ def test_from_the_side_bands_are_slices_and_columns_stand_on_the_skin() -> None:
     shells = shell_vertices(skin.vertices, skin.normals, tall, 4)
     pictures = {}
     for fill in FILLS:
-        image = fur_texture(photo.radiance, grey, photo.attenuation, 4, tails="end layers")
+        image = fur_texture(photo, 4, tails="end layers")
         actor = fur_surface(
             shells,
             skin.normals,
@@ -267,9 +267,7 @@ def test_from_the_side_bands_are_slices_and_columns_stand_on_the_skin() -> None:
 def test_one_actor_holds_all_shells_and_one_texture() -> None:
     photo, skin, layers = random_photograph(10), flat_skin(3), 15
     shells = shell_vertices(skin.vertices, skin.normals, THICKNESS, layers)
-    image = fur_texture(
-        photo.radiance, photo.luminance, photo.attenuation, layers, tails="end layers"
-    )
+    image = fur_texture(photo, layers, tails="end layers")
     actor = fur_surface(
         shells,
         skin.normals,
@@ -298,7 +296,7 @@ def test_one_actor_holds_all_shells_and_one_texture() -> None:
 
 def test_the_texture_is_the_photograph_with_the_depth_in_alpha() -> None:
     photo = random_photograph(11, (5, 7))
-    image = fur_texture(photo.radiance, photo.luminance, photo.attenuation, 10, tails="dropped")
+    image = fur_texture(photo, 10, tails="dropped")
     assert image.dtype == np.uint8
     assert image.shape == (5, 7, 4)
     np.testing.assert_array_equal(image[..., :3], to_8bit(photo.radiance))

@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from storage.readers import BadInput
-from storage.readers.photographs import BUILTIN_PHOTOGRAPHS, builtin_photograph, read_photograph
+from storage.readers.photographs import (
+    BUILTIN_PHOTOGRAPHS,
+    PhotographFile,
+    builtin_photograph,
+    read_photograph,
+)
 
 HEIGHT, WIDTH = 66, 70
 
@@ -124,7 +129,7 @@ def test_png_written_by_hand_is_read_at_full_precision(tmp_path: Path, dtype: ty
     for channels, colour_type in ((3, 2), (1, 0)):
         codes = picture(dtype, channels)
         file.write_bytes(png_bytes(codes, colour_type))
-        light = read_photograph(file)
+        light = read_photograph(file).radiance
         assert light.dtype == np.float32
         assert light.shape == (HEIGHT, WIDTH, 3)
         np.testing.assert_allclose(light, np.broadcast_to(light_of(codes), light.shape), rtol=3e-7)
@@ -137,7 +142,7 @@ def test_neighbouring_16_bit_codes_stay_apart(tmp_path_factory: Any, code: int) 
     codes[0] += 1
     file = tmp_path_factory.mktemp("codes") / "fur.png"
     file.write_bytes(png_bytes(codes, 2))
-    light = read_photograph(file)
+    light = read_photograph(file).radiance
     assert (light[0] > light[1]).all()
 
 
@@ -147,17 +152,19 @@ def test_16_bit_tiff(tmp_path: Path, compression: str | None, byteorder: Any) ->
     codes = picture(np.uint16)
     file = tmp_path / "fur.tif"
     tifffile.imwrite(file, codes, photometric="rgb", compression=compression, byteorder=byteorder)
-    np.testing.assert_allclose(read_photograph(file), light_of(codes), rtol=3e-7)
+    np.testing.assert_allclose(read_photograph(file).radiance, light_of(codes), rtol=3e-7)
 
 
 def test_lzw_tiff_of_either_depth(tmp_path: Path) -> None:
     codes = picture(np.uint8)
     Image.fromarray(codes).save(tmp_path / "fur.tif", compression="tiff_lzw")
-    np.testing.assert_allclose(read_photograph(tmp_path / "fur.tif"), light_of(codes), rtol=3e-7)
+    np.testing.assert_allclose(
+        read_photograph(tmp_path / "fur.tif").radiance, light_of(codes), rtol=3e-7
+    )
     grey = picture(np.uint16, 1)
     Image.fromarray(grey[..., 0]).save(tmp_path / "grey.tif", compression="tiff_lzw")
     expected = np.broadcast_to(light_of(grey), (HEIGHT, WIDTH, 3))
-    np.testing.assert_allclose(read_photograph(tmp_path / "grey.tif"), expected, rtol=3e-7)
+    np.testing.assert_allclose(read_photograph(tmp_path / "grey.tif").radiance, expected, rtol=3e-7)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -166,7 +173,7 @@ def test_tiff_in_which_white_is_zero(tmp_path: Path, dtype: type) -> None:
     file = tmp_path / "negative.tif"
     tifffile.imwrite(file, codes[..., 0], photometric="miniswhite")
     expected = light_of(np.iinfo(dtype).max - codes)
-    np.testing.assert_allclose(read_photograph(file)[..., :1], expected, rtol=3e-7)
+    np.testing.assert_allclose(read_photograph(file).radiance[..., :1], expected, rtol=3e-7)
 
 
 def test_tiff_with_a_channel_that_is_not_alpha(tmp_path: Path) -> None:
@@ -174,52 +181,58 @@ def test_tiff_with_a_channel_that_is_not_alpha(tmp_path: Path) -> None:
         codes = picture(dtype, 4)
         file = tmp_path / f"{np.dtype(dtype)}.tif"
         tifffile.imwrite(file, codes, photometric="rgb", extrasamples=["unspecified"])
-        np.testing.assert_allclose(read_photograph(file), light_of(codes[..., :3]), rtol=3e-7)
+        np.testing.assert_allclose(
+            read_photograph(file).radiance, light_of(codes[..., :3]), rtol=3e-7
+        )
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_float_tiff_is_linear(tmp_path: Path, dtype: type) -> None:
     light = picture(dtype)
     tifffile.imwrite(tmp_path / "fur.tif", light, photometric="rgb")
-    np.testing.assert_allclose(read_photograph(tmp_path / "fur.tif"), light, rtol=1e-7)
+    np.testing.assert_allclose(read_photograph(tmp_path / "fur.tif").radiance, light, rtol=1e-7)
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
 def test_exr_is_linear_and_unbounded(tmp_path: Path, dtype: type) -> None:
     light = picture(dtype)
     file = exr_file(tmp_path / "fur.exr", {"RGB": light})
-    np.testing.assert_array_equal(read_photograph(file), light.astype(np.float32))
-    assert read_photograph(file).max() > 1
+    np.testing.assert_array_equal(read_photograph(file).radiance, light.astype(np.float32))
+    assert read_photograph(file).radiance.max() > 1
     file = exr_file(tmp_path / "grey.exr", {"Y": light[..., 0]})
-    np.testing.assert_array_equal(read_photograph(file)[..., 2], light[..., 0].astype(np.float32))
+    np.testing.assert_array_equal(
+        read_photograph(file).radiance[..., 2], light[..., 0].astype(np.float32)
+    )
     opaque = exr_file(tmp_path / "a.exr", {"RGBA": np.dstack([light, np.ones_like(light[..., 0])])})
-    np.testing.assert_array_equal(read_photograph(opaque), light.astype(np.float32))
+    np.testing.assert_array_equal(read_photograph(opaque).radiance, light.astype(np.float32))
 
 
 def test_jpeg_is_close_to_what_was_encoded(tmp_path: Path) -> None:
     across, down = np.meshgrid(np.linspace(20, 230, WIDTH), np.linspace(20, 230, HEIGHT))
     codes = np.dstack([across, down, (across + down) / 2]).astype(np.uint8)
     Image.fromarray(codes).save(tmp_path / "fur.jpg", quality=98, subsampling=0)
-    assert np.abs(read_photograph(tmp_path / "fur.jpg") - light_of(codes)).max() < 0.03
+    assert np.abs(read_photograph(tmp_path / "fur.jpg").radiance - light_of(codes)).max() < 0.03
 
 
 def test_palette_and_opaque_alpha_are_converted(tmp_path: Path) -> None:
     codes = picture(np.uint8) // 128 * 255
     Image.fromarray(codes).quantize(8).save(tmp_path / "palette.png")
-    np.testing.assert_allclose(read_photograph(tmp_path / "palette.png"), codes / 255)
+    np.testing.assert_allclose(read_photograph(tmp_path / "palette.png").radiance, codes / 255)
     codes = picture(np.uint16, 4)
     codes[..., 3] = 65535
     (tmp_path / "rgba.png").write_bytes(png_bytes(codes, 6))
     expected = light_of(codes[..., :3])
-    np.testing.assert_allclose(read_photograph(tmp_path / "rgba.png"), expected, rtol=3e-7)
+    np.testing.assert_allclose(read_photograph(tmp_path / "rgba.png").radiance, expected, rtol=3e-7)
     (tmp_path / "la.png").write_bytes(png_bytes(codes[..., [0, 3]], 4))
-    np.testing.assert_allclose(read_photograph(tmp_path / "la.png")[..., 1], expected[..., 0])
+    np.testing.assert_allclose(
+        read_photograph(tmp_path / "la.png").radiance[..., 1], expected[..., 0]
+    )
 
 
 def test_crop_is_left_top_width_height(tmp_path: Path) -> None:
     codes = picture(np.uint8)
     (tmp_path / "fur.png").write_bytes(png_bytes(codes, 2))
-    light = read_photograph(tmp_path / "fur.png", crop=(5, 1, 64, 65))
+    light = read_photograph(tmp_path / "fur.png", crop=(5, 1, 64, 65)).radiance
     np.testing.assert_allclose(light, light_of(codes[1:66, 5:69]), rtol=3e-7)
 
 
@@ -246,10 +259,14 @@ def test_orientation_is_honoured(tmp_path: Path, orientation: int, dtype: type) 
     stored = _eight_orientations(upright)[orientation]
     tag = [(274, "H", 1, orientation, True)]
     tifffile.imwrite(tmp_path / "fur.tif", stored, photometric="rgb", extratags=tag)
-    np.testing.assert_allclose(read_photograph(tmp_path / "fur.tif"), light_of(upright), rtol=3e-7)
+    np.testing.assert_allclose(
+        read_photograph(tmp_path / "fur.tif").radiance, light_of(upright), rtol=3e-7
+    )
     exif = b"MM\0*\0\0\0\x08" + struct.pack(">HHHIHHI", 1, 274, 3, 1, orientation, 0, 0)
     (tmp_path / "fur.png").write_bytes(png_bytes(stored, 2, (b"eXIf", exif)))
-    np.testing.assert_allclose(read_photograph(tmp_path / "fur.png"), light_of(upright), rtol=3e-7)
+    np.testing.assert_allclose(
+        read_photograph(tmp_path / "fur.png").radiance, light_of(upright), rtol=3e-7
+    )
 
 
 def test_orientation_of_a_jpeg(tmp_path: Path) -> None:
@@ -259,7 +276,7 @@ def test_orientation_of_a_jpeg(tmp_path: Path) -> None:
     exif[0x0112] = 6
     stored = Image.fromarray(_eight_orientations(upright)[6])
     stored.save(tmp_path / "phone.jpg", quality=95, exif=exif)
-    light = read_photograph(tmp_path / "phone.jpg")
+    light = read_photograph(tmp_path / "phone.jpg").radiance
     assert light.shape == (64, 80, 3)
     assert light[4, 4].min() > 0.9
     assert light[4, -4].max() < 0.1
@@ -272,7 +289,7 @@ def test_display_p3_is_converted_like_the_closed_form(tmp_path: Path) -> None:
     profile = rgb_profile(DISPLAY_P3, "Display P3")
     for name in ("fur.png", "fur.tif"):
         Image.fromarray(codes).save(tmp_path / name, icc_profile=profile)
-        light = read_photograph(tmp_path / name)
+        light = read_photograph(tmp_path / name).radiance
         assert np.abs(light - expected).max() < 0.01  # a step of 255 is 0.009 in the lights
         assert np.abs(light - light_of(codes)).max() > 0.03
 
@@ -284,12 +301,14 @@ def test_an_srgb_profile_changes_nothing(tmp_path: Path) -> None:
         chunk = (b"iCCP", b"any\0\0" + zlib.compress(profile))
         (tmp_path / "fur.png").write_bytes(png_bytes(codes, 2, chunk))
         expected = light_of(codes)
-        np.testing.assert_allclose(read_photograph(tmp_path / "fur.png"), expected, rtol=3e-7)
+        np.testing.assert_allclose(
+            read_photograph(tmp_path / "fur.png").radiance, expected, rtol=3e-7
+        )
 
 
 @pytest.mark.parametrize("name", BUILTIN_PHOTOGRAPHS)
 def test_builtin_photographs_ship_with_scikit_image(name: str) -> None:
-    light = builtin_photograph(name)
+    light = builtin_photograph(name).radiance
     width, height = BUILTIN_PHOTOGRAPHS[name].crop[2:]
     assert light.shape == (height, width, 3)
     assert light.std() > 0.02
