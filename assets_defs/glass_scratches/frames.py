@@ -12,16 +12,15 @@ from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import ENVIRONMENTS, SCRATCHES
 from assets_defs.settings import Preset, Settings, UserFile
 from assets_defs.sources import Source
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from storage.schemas import glass_scratches as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
 
     from pipelines.geometry.solids import Solid
+    from storage.readers.environments import EnvironmentFile
 
 _ENVIRONMENT_HEIGHT = 512
 
@@ -151,7 +150,7 @@ def check_environment_setting(settings: FrameSettings) -> None:
         _read_environment(settings.environment)
 
 
-def _read_environment(name: str) -> NDArray[np.float32]:
+def _read_environment(name: str) -> EnvironmentFile:
     from storage.readers.environments import read_environment
 
     if not Path(name).suffix:
@@ -161,12 +160,17 @@ def _read_environment(name: str) -> NDArray[np.float32]:
     return read_environment(name)
 
 
-def environment(settings: FrameSettings) -> NDArray[np.float32]:
-    """The environment's radiance (H, 2 H, 3), turned. Raises as `check_environment_setting`."""
+def environment(settings: FrameSettings) -> EnvironmentFile:
+    """The environment's radiance (H, 2 H, 3), turned, and what was done to a user's file.
+
+    Raises as `check_environment_setting`.
+    """
     from pipelines.light import built_in_environments
     from pipelines.light.environment_maps import rotate_environment
+    from storage.readers.environments import EnvironmentFile
 
     height = _ENVIRONMENT_HEIGHT
+    notes: tuple[str, ...] = ()
     if settings.environment == "lamps":
         radiance = built_in_environments.lamps(height)
     elif settings.environment == "sky":
@@ -174,8 +178,8 @@ def environment(settings: FrameSettings) -> NDArray[np.float32]:
     elif settings.environment == "uniform":
         radiance = built_in_environments.uniform(8)
     else:
-        radiance = _read_environment(settings.environment)
-    return rotate_environment(radiance, settings.turn)
+        radiance, notes = _read_environment(settings.environment)
+    return EnvironmentFile(rotate_environment(radiance, settings.turn), notes)
 
 
 def _frame_pictures(dataset: xr.Dataset) -> Pictures:
@@ -290,9 +294,10 @@ def glass_frames(
 
     material = material_of(scratch_table_2d, scratch_table, scratch_layers)
     glass = scratched_glass(solid_of(glass_object), material, tile=settings.tile)
+    light = environment(settings)
     frames = draw_frames(
         glass,
-        make_environment_sampler(environment(settings)),
+        make_environment_sampler(light.radiance),
         size=settings.size,
         samples=settings.samples,
         lights=settings.lights,
@@ -302,4 +307,5 @@ def glass_frames(
     )
     dataset = frames_dataset(frames)
     noise = float(dataset["error"].values[1].mean())
-    return dataset, {"rays": frames.far.rays + frames.close.rays, "noise, close": noise}
+    rays = frames.far.rays + frames.close.rays
+    return dataset, {"rays": rays, "noise, close": noise, NOTES: light.notes}

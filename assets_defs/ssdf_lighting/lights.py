@@ -12,14 +12,14 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.datasets import lights_dataset, lights_of
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
-    from numpy.typing import NDArray
+
+    from storage.readers.environments import EnvironmentFile
 
 _HEIGHT = 256
 """Rows of the built-in environments."""
@@ -55,6 +55,14 @@ def _irradiance_error(version: StoredVersion) -> float:
 
 def _tone_error(version: StoredVersion) -> float:
     return float(version.dataset["tone_error"])
+
+
+def _share_from_above(version: StoredVersion) -> float:
+    from pipelines.light.environment_maps import solid_angles
+
+    radiance = version.dataset["radiance"].values
+    flux = radiance.sum(axis=(1, 2)) * solid_angles(len(radiance))
+    return float(flux[: len(flux) // 2].sum() / flux.sum())
 
 
 def _light_pictures(dataset: xr.Dataset) -> Pictures:
@@ -99,13 +107,21 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
             at_most=1.0,
             change=0.02,
         ),
+        Check(
+            "share_from_above",
+            "Share of the flux from above the horizon: little where the sky lies below.",
+            _share_from_above,
+            at_least=0.15,
+            change=0.02,
+        ),
     ),
 )
 def environment_lights(settings: LightSettings, source: Source, progress: Progress) -> Result:
     """Fit spherical Gaussians to the environment."""
     from pipelines.ssdf_lighting.light.environment_fit import downsampled, fit_lights, flux_error
 
-    small = downsampled(_radiance(settings, source), _STORED)
+    light = _light(settings, source)
+    small = downsampled(light.radiance, _STORED)
     fit = fit_lights(
         small,
         settings.lights,
@@ -117,18 +133,19 @@ def environment_lights(settings: LightSettings, source: Source, progress: Progre
     return dataset, {
         "sharpest λ": float(fit.lights.sharpness.max()),
         "irradiance error": fit.irradiance_error,
+        NOTES: light.notes,
     }
 
 
-def _radiance(settings: LightSettings, source: Source) -> NDArray[np.floating]:
-    """The environment (row, column, 3). Raises BadInput for a file that holds none."""
+def _light(settings: LightSettings, source: Source) -> EnvironmentFile:
+    """The environment. Raises BadInput for a file that holds none."""
     from pipelines.light.built_in_environments import lamps, sky, uniform
-    from storage.readers.environments import read_environment
+    from storage.readers.environments import EnvironmentFile, read_environment
 
     if source.path is not None:
         return read_environment(source.path)
     if source.key == "sky":
-        return sky(_HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation)
-    if source.key == "lamps":
-        return lamps(_HEIGHT)
-    return uniform(8)
+        made = sky(_HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation)
+    else:
+        made = lamps(_HEIGHT) if source.key == "lamps" else uniform(8)
+    return EnvironmentFile(made, ())

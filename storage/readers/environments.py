@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.image_decoding import decode_image
+from storage.readers.exr_files import exr_header, read_exr
 from storage.readers.opening import check_memory, first_bytes
 from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
 from storage.readers.radiance_files import (
@@ -22,133 +23,176 @@ from storage.readers.radiance_files import (
     radiance_header,
     radiance_pixels,
 )
+from storage.readers.radiance_values import mended
 
 SMALLEST_WIDTH = 16
 LARGEST_WIDTH = 16384
 
 _EXPECTED = "a Radiance .hdr or an OpenEXR .exr file"
 _EXR_SIGNATURE = b"\x76\x2f\x31\x01"
+_HALF_SIGNATURE = b"32-bit_rle_"  # of a header without its first line
+_EIGHT_BITS = "a Radiance .hdr or an OpenEXR .exr file: 8 bits hold no radiance of lamps or the sun"
+_CONVERTED = "a Radiance .hdr or an OpenEXR .exr file: convert it, with oiiotool for instance"
 _OTHER_SIGNATURES = {
-    b"\x89PNG\r\n\x1a\n": "PNG",
-    b"\xff\xd8\xff": "JPEG",
-    b"II*\0": "TIFF",
-    b"MM\0*": "TIFF",
+    b"\x89PNG\r\n\x1a\n": ("PNG", _EIGHT_BITS),
+    b"\xff\xd8\xff": ("JPEG", _EIGHT_BITS),
+    b"GIF8": ("GIF", _EIGHT_BITS),
+    b"BM": ("BMP", _EIGHT_BITS),
+    b"RIFF": ("WebP", _EIGHT_BITS),
+    b"II*\0": ("TIFF", _CONVERTED),
+    b"MM\0*": ("TIFF", _CONVERTED),
+    b"PF\n": ("PFM", _CONVERTED),
+    b"PF ": ("PFM", _CONVERTED),
+    b"8BPS": ("PSD", _CONVERTED),
+    b"DDS ": ("DDS", _CONVERTED),
+    b"\xabKTX": ("KTX", _CONVERTED),
+    b"\xff\x0a": ("JPEG XL", _CONVERTED),
+    b"\0\0\0\x0cJXL ": ("JPEG XL", _CONVERTED),
 }
 _LONGEST_HEADER = 1_000_000  # bytes of a Radiance header; the usual ones have some hundred
-_LONGEST_RUN = 127  # of a Radiance picture
 _PIXEL_BYTES = 40
-_CHANNELS = {1: ("grey",), 3: ("red", "green", "blue")}
+_NEARLY = 0.01  # by which width may differ from twice the height
 
 
-def read_environment(path: str | PathLike[str]) -> NDArray[np.float32]:
-    """Read an equirectangular environment as linear radiance.
+class EnvironmentFile(NamedTuple):
+    """``radiance``: (height, width, 3) float32, width = 2 * height, the top row first: linear RGB
+    with the primaries of sRGB, 0 and more, in the file's own unit. ``notes``: sentences on what was
+    converted, mended or left out.
+    """
 
-    Parameters: ``path``, a Radiance picture (.hdr, RGBE, flat or run-length encoded; exposures
-    are divided out) or an OpenEXR file (.exr, half or float, RGB or Y alone, with the primaries
-    of sRGB). An alpha channel is passed over where it is 1 everywhere. Of an EXR with several
-    parts the first is read.
+    radiance: NDArray[np.float32]
+    notes: tuple[str, ...]
 
-    Returns (height, width, 3) float32 with width = 2 * height, the top row first: linear RGB
-    with the primaries of sRGB, 0 and more, in the file's own unit. Grey files give three equal
-    channels.
+
+def read_environment(path: str | PathLike[str]) -> EnvironmentFile:
+    """Read an environment as equirectangular linear radiance.
+
+    Parameters: ``path``, a Radiance picture (.hdr, RGBE or XYZE in all its codes; exposures are
+    divided out) or an OpenEXR file (.exr, half or float; of several layers the beauty). Other
+    primaries become sRGB's; grey gives three equal channels; alpha is left out. A cube's cross,
+    and the column of faces that OpenEXR marks as a cube, are unfolded.
 
     Raises BadInput for a file that is missing, truncated, damaged, of another format (PNG, JPEG
-    and TIFF hold no radiance) or colour space; for a width that is not exactly twice the height,
-    is below 16 or above 16384 pixels; for an EXR that holds a part of its picture only; and for
-    transparent pixels, values that are not finite or negative (naming the first by column and
-    row, from 0 at the top left) and a picture that is all black.
+    and TIFF hold no radiance) or projection, narrower than 16 pixels, mostly without numbers or
+    negative, or all black.
     """
     file = Path(path)
     start = first_bytes(file, _LONGEST_HEADER, _EXPECTED, LARGEST_PICTURE)
-    if start.startswith(SIGNATURE):
-        light = _radiance_picture(file, start)
+    if start.startswith(SIGNATURE) or _HALF_SIGNATURE in start[:1000]:
+        light, cube, notes = _radiance_picture(file, start)
     elif start.startswith(_EXR_SIGNATURE):
-        light = _exr_picture(file)
+        light, cube, notes = _exr_picture(file)
     else:
         raise _no_radiance(file, start)
-    _check_radiance(file, light)
+    light, size_notes = _equirectangular(file, light, cube)
+    light, value_notes = mended(file, light)
     if light.shape[2] == 1:
         light = np.repeat(light, 3, axis=2)
-    return np.ascontiguousarray(light)
+    return EnvironmentFile(np.ascontiguousarray(light), (*notes, *size_notes, *value_notes))
 
 
 def _no_radiance(file: Path, start: bytes) -> BadInput:
-    for signature, name in _OTHER_SIGNATURES.items():
+    for signature, (name, expected) in _OTHER_SIGNATURES.items():
         if start.startswith(signature):
-            return BadInput(file, "format", name, f"{_EXPECTED}, as radiance needs one of them")
+            return BadInput(file, "format", name, expected)
     found = "unknown" if start else "unknown (the file is empty)"
     return BadInput(file, "format", found, _EXPECTED)
 
 
-def _radiance_picture(file: Path, start: bytes) -> NDArray[np.float32]:
+def _radiance_picture(
+    file: Path, start: bytes
+) -> tuple[NDArray[np.float32], bool, tuple[str, ...]]:
     try:
         header = radiance_header(file, start)
     except IndexError:
-        raise _damaged(file, "Radiance") from None
-    _check_size(file, header.width, header.height)
-    _check_memory(file, header)
-    return radiance_pixels(file, file.read_bytes())
-
-
-def _exr_picture(file: Path) -> NDArray[np.float32]:
-    import OpenEXR
-
-    try:
-        with OpenEXR.File(str(file), header_only=True) as header_file:
-            header = header_file.parts[0].header
-            # Copied: closing the file empties the header. Each is left, top, right, bottom.
-            stored = np.array(header["dataWindow"], np.int64).ravel()
-            whole = np.array(header["displayWindow"], np.int64).ravel()
-    except Exception as error:  # RuntimeError, ValueError and others by what is broken
-        raise _damaged(file, "EXR") from error
-    if not np.array_equal(stored, whole):
-        # Pixels outside the data window would have to be black, which no room is.
         raise BadInput(
-            file,
-            "data window",
-            " ".join(map(str, stored)),
-            f"the display window, {' '.join(map(str, whole))}",
-        )
-    _check_size(file, int(whole[2] - whole[0] + 1), int(whole[3] - whole[1] + 1))
-    image = decode_image(file)
-    if image.opaque is not None and not image.opaque.all():
-        holes = image.opaque.size - np.count_nonzero(image.opaque)
-        raise BadInput(file, "alpha", f"less than opaque in {holes} pixel(s)", "an opaque picture")
-    return image.colours.astype(np.float32)
+            file, "content", "truncated or damaged", "a complete Radiance file"
+        ) from None
+    _check_size(file, header.width, header.height, cube=False)
+    _check_memory(file, header)
+    return radiance_pixels(file, file.read_bytes()), False, header.notes
 
 
-def _check_size(file: Path, width: int, height: int) -> None:
+def _exr_picture(file: Path) -> tuple[NDArray[Any], bool, tuple[str, ...]]:
+    header = exr_header(file)
+    _check_size(file, header.width, header.height, header.cube)
+    picture = read_exr(file, header)
+    if picture.alpha is None:
+        return picture.colours, header.cube, picture.notes
+    below = np.count_nonzero(~(picture.alpha >= 1))
+    alpha = (f"Alpha, below 1 in {below} pixels, was left out.",) if below else ()
+    return picture.colours, header.cube, (*picture.notes, *alpha)
+
+
+def _check_size(file: Path, width: int, height: int, cube: bool) -> None:
+    from storage.readers.cube_maps import is_cross
+
     found = f"{width} x {height} pixels"
-    if width != 2 * height:
-        raise BadInput(file, "size", found, "a width of exactly twice the height")
-    if width < SMALLEST_WIDTH:
-        smallest = f"at least {SMALLEST_WIDTH} x {SMALLEST_WIDTH // 2} pixels"
-        raise BadInput(file, "size", found, smallest)
-    if width > LARGEST_WIDTH:
-        largest = f"at most {LARGEST_WIDTH} x {LARGEST_WIDTH // 2} pixels"
-        raise BadInput(file, "size", found, largest)
+    if cube:
+        if height != 6 * width:
+            raise BadInput(file, "size of a cube's faces", found, "a height of six widths")
+    elif not is_cross(width, height) and abs(width - 2 * height) > _NEARLY * 2 * height:
+        raise BadInput(
+            file, "size", found, f"a width of twice the height{_other_way(width, height)}"
+        )
+    if max(width, height) < SMALLEST_WIDTH:
+        raise BadInput(file, "size", found, f"a width of at least {SMALLEST_WIDTH} pixels")
+
+
+def _other_way(width: int, height: int) -> str:
+    """For what projections have such a size, what to do."""
+    if width == height:
+        return (
+            ": unfold an angular map or a mirror ball first, with HDR Shop for instance, and crop "
+            "a stereo pair to one eye"
+        )
+    if 6 in (width / max(height, 1), height / max(width, 1)):
+        return ": convert a cube's faces first, with cmft for instance, as their order differs"
+    if width > 2 * height:
+        return ": fill up what is missing above or below, or crop a stereo pair to one eye"
+    return ": an equirectangular picture all around"
 
 
 def _check_memory(file: Path, header: RadianceHeader) -> None:
-    pixels = header.width * header.height
-    stored = file.stat().st_size - header.pixels_at
-    if _LONGEST_RUN * stored < 2 * 4 * pixels:  # two bytes a run of one of four channels
-        raise _damaged(file, "Radiance")
     found = f"{header.width} x {header.height} pixels"
-    check_memory(file, "size", found, _PIXEL_BYTES * pixels, stored, MEMORY_PER_BYTE)
+    needed = _PIXEL_BYTES * header.width * header.height
+    stored = file.stat().st_size - header.pixels_at
+    check_memory(file, "size", found, needed, stored, MEMORY_PER_BYTE)
 
 
-def _check_radiance(file: Path, light: NDArray[np.float32]) -> None:
-    """A negative zero passes: it is 0."""
-    for good, expected in ((np.isfinite(light), "a finite value"), (light >= 0, "0 or more")):
-        if not good.all():
-            row, column, channel = np.unravel_index(int(np.argmin(good)), good.shape)
-            name = _CHANNELS[light.shape[2]][channel]
-            value = f"{light[row, column, channel]}"
-            raise BadInput(file, f"{name} at column {column}, row {row}", value, expected)
-    if light.max() == 0:
-        raise BadInput(file, "picture", "all black", "an environment with light in it")
+def _equirectangular(
+    file: Path, light: NDArray[Any], cube: bool
+) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Twice as wide as high, at most 16384 wide."""
+    from storage.readers import cube_maps
+
+    notes = []
+    height, width = light.shape[:2]
+    if cube:
+        light = cube_maps.of_column(light)
+        notes.append("The six faces of a cube were unfolded.")
+    elif cube_maps.is_cross(width, height):
+        unfolded = cube_maps.of_cross(light)
+        if unfolded is None:
+            found = f"{width} x {height} pixels with something in a cross's corners"
+            raise BadInput(file, "size", found, "a width of twice the height, or a cube's cross")
+        light = unfolded
+        notes.append("The cross of a cube's faces was unfolded.")
+    height, width = light.shape[:2]
+    wanted = min(height, width // 2, LARGEST_WIDTH // 2)
+    if (height, width) != (wanted, 2 * wanted):
+        light = _averaged(light, wanted)
+        notes.append(
+            f"{width} x {height} pixels were averaged to {2 * wanted} x {wanted}, "
+            f"for a width of twice the height and at most {LARGEST_WIDTH}."
+        )
+    return light, tuple(notes)
 
 
-def _damaged(file: Path, kind: str) -> BadInput:
-    return BadInput(file, "content", "truncated or damaged", f"a complete {kind} file")
+def _averaged(light: NDArray[Any], height: int) -> NDArray[np.float32]:
+    import cv2
+
+    smaller = cv2.resize(
+        light.astype(np.float32), (2 * height, height), interpolation=cv2.INTER_AREA
+    )
+    return np.asarray(smaller, np.float32).reshape(height, 2 * height, light.shape[2])

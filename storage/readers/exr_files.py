@@ -115,7 +115,7 @@ def exr_header(file: Path) -> ExrHeader:
         exr_layers.Part("" if alone else h.get("name", ""), h.get("view", ""), list(h["sampling"]))
         for h in headers
     ]
-    views = next((h["multiView"] for h in headers if h.get("multiView")), [])
+    views: list[str] = next((h["multiView"] for h in headers if h.get("multiView")), [])
     layer = exr_layers.picture_of(file, parts, views)
     header = headers[layer.part]
     left, top, right, bottom = header["displayWindow"]
@@ -147,7 +147,9 @@ def exr_header(file: Path) -> ExrHeader:
 
 def _copied(header: Mapping[str, Any]) -> dict[str, Any]:
     """Windows as left, top, right, bottom, the ends exclusive."""
-    copied = {name: value for name, value in header.items() if isinstance(value, str | int | list)}
+    copied: dict[str, Any] = {
+        name: value for name, value in header.items() if isinstance(value, str | int | list)
+    }
     copied["envmap"] = header.get("envmap")
     copied["kind"] = str(header.get("type"))
     for name in ("dataWindow", "displayWindow"):

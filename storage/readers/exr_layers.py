@@ -26,8 +26,10 @@ _KINDS = (
 _ALPHA = ("a", "alpha")
 _PICTURES = ("combined", "beauty", "rgba", "rgb")
 """However deep: ``View Layer.Combined.R``, ``left.beauty.R``."""
-_PICTURES_ALONE = ("c", "ci", "color", "colour", "composite", "default", "final", "finalimage")
-_PICTURES_ALONE += ("image", "main", "output", "radiance", "render", "xyz")
+_PICTURES_ALONE = tuple(
+    "c ci color colour composite default final finalimage image main output radiance render "
+    "xyz".split()
+)
 """A layer's whole name: ``diffuse.color`` is another thing."""
 _VIEWS = ("left", "right", "center", "centre")
 _CHANNEL = re.compile(r"(?:(?P<layer>.*)\.)?(?P<last>[^.]*)")

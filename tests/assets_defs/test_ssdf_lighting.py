@@ -16,6 +16,7 @@ from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines.geometry import shapes
+from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting import figures, scene
 from pipelines.ssdf_lighting.compression import compact, shared_basis, triangle_clusters
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes
@@ -250,6 +251,10 @@ def _bright(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     return fit._replace(lights=fit.lights._replace(amplitudes=fit.lights.amplitudes * 1.01))
 
 
+def _upside_down(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    return right(*arguments, **options)[::-1]
+
+
 def _turned(right: Callable[..., Any], radiance: Any, *arguments: Any, **options: Any) -> Any:
     fit = right(radiance, *arguments, **options)
     return environment_fit.evaluate_fit(rotated(fit.lights, 70.0), radiance)
@@ -287,6 +292,7 @@ REGRESSIONS = (
     Regression("flux_error", environment_fit, "fit_lights", _bright, SKY),
     Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
+    Regression("share_from_above", built_in_environments, "sky", _upside_down, SKY),
     Regression("relit_psnr", Decoder, "distances_along", _stepping, KEYS),
     Regression("reference_psnr", frames, "traced_reference", _wrong_lights, KEYS),
     Regression("coverage", frames, "scene_camera", _far_camera, KEYS),
