@@ -26,9 +26,9 @@ _KINDS = (
 _ALPHA = ("a", "alpha")
 _PICTURES = ("combined", "beauty", "rgba", "rgb")
 """However deep: ``View Layer.Combined.R``, ``left.beauty.R``."""
-_PICTURES_ALONE = tuple(
-    "c ci color colour composite default final finalimage image main output radiance render "
-    "xyz".split()
+_PICTURES_ALONE = (
+    *("c", "ci", "color", "colour", "composite", "default", "final", "finalimage", "image"),
+    *("main", "output", "radiance", "render", "xyz"),
 )
 """A layer's whole name: ``diffuse.color`` is another thing."""
 _VIEWS = ("left", "right", "center", "centre")
