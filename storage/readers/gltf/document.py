@@ -25,6 +25,7 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 VISIBILITY = "KHR_node_visibility"
 
 _LARGEST_WHOLE = 1 << 48
+_MISSING = "missing"
 _WAY_OUT = "or export it anew (Blender, gltf-transform)"
 
 
@@ -62,7 +63,7 @@ def checked(file: Path, description: Any) -> dict[str, Any]:
         document: dict[str, Any] = _checked(description, _table(counts))
     except _Wrong as wrong:
         field = "".join(reversed(wrong.place)).lstrip(".") or "content"
-        shown = json.dumps(wrong.found, default=str)[:60]
+        shown = _MISSING if wrong.found is _MISSING else json.dumps(wrong.found)[:60]
         expected = f"{wrong.expected}, as glTF 2.0 has it, {_WAY_OUT}"
         raise BadInput(file, field, shown, expected) from None
     return document
@@ -83,7 +84,7 @@ def _checked(value: Any, check: Any) -> Any:
         raise _Wrong(value, "an object")
     for name in check.required:
         if value.get(name) is None:
-            missing = _Wrong(None, "this property")
+            missing = _Wrong(_MISSING, "this property")
             missing.place.append(f".{name}")
             raise missing
     for name, inner in (check.required | check.optional).items():

@@ -6,12 +6,12 @@ import re
 from pathlib import Path
 from typing import Any
 
-from storage.readers.bad_input import BadInput, shortened
+from storage.readers.bad_input import BadInput
 from storage.readers.gltf.document import DRACO, INSTANCING, MESHOPT, VISIBILITY
 
 _READ = {*MESHOPT, DRACO, INSTANCING, VISIBILITY, "KHR_mesh_quantization"}
-_SAID = {"KHR_lights_punctual", "KHR_materials_variants", "MSFT_lod"}
-"""What `notes` has a sentence for."""
+_SAID = {"KHR_lights_punctual", "KHR_materials_variants", "MSFT_lod", "CESIUM_RTC"}
+"""What `notes` has sentences for."""
 _LOOKS = re.compile(r"[A-Z]+[0-9]*_(materials?|textures?|lights?)_.*|MSFT_texture_dds|EXT_bloom")
 """Of materials, textures and lights: whoever shows them judges."""
 _WITHOUT_SHAPE = {
@@ -27,26 +27,29 @@ _WITHOUT_SHAPE = {
     "MPEG_media", "GODOT_single_root", "BLENDER_physics", "MOZ_hubs_components",
 }  # fmt: skip
 """Behaviour and knowledge about things: nothing that is drawn is lost."""
-_WAYS_OUT = {
-    "KHR_gaussian_splatting": "triangles, which splats have none of",
-    "KHR_techniques_webgl": "plain materials: gltf-pipeline turns them into such",
-}
 
 
-def check_version_and_extensions(file: Path, document: dict[str, Any]) -> None:
-    """Raise BadInput for a glTF that says that it cannot be read without what this reader lacks."""
-    asset = document["asset"]
-    for name in ("version", "minVersion"):
-        version = asset.get(name, "2.0" if name == "minVersion" else "missing")
-        if not re.match(r"2(\.\d+)?$", f"{version}"):
-            expected = "2.0 (convert it: gltf-pipeline makes glTF 2.0 of 1.0)"
-            raise BadInput(file, f"glTF {name}", shortened(f"{version}"), expected)
-        if name == "minVersion" and f"{version}" not in ("2.0", "2"):
-            raise BadInput(file, f"glTF {name}", f"{version}", "2.0: export it as glTF 2.0")
+def check_version(file: Path, description: Any) -> None:
+    """Raise BadInput for JSON of another version than 2, or that wants a later reader than 2.0."""
+    asset = description.get("asset") if isinstance(description, dict) else None
+    held = asset if isinstance(asset, dict) else {}
+    version, least = held.get("version", "missing"), held.get("minVersion", "2.0")
+    if not re.fullmatch(r"2(\.\d+)?", f"{version}"):
+        expected = "2.0 (of glTF 1.0 gltf-pipeline makes 2.0)"
+        raise BadInput(file, "glTF version", f"{version}", expected)
+    if f"{least}" not in ("2.0", "2"):
+        raise BadInput(file, "glTF minVersion", f"{least}", "2.0: export it as glTF 2.0")
+
+
+def check_required(file: Path, document: dict[str, Any]) -> None:
+    """Raise BadInput for a document that cannot be read without an extension that is not known."""
     for name in document.get("extensionsRequired", ()):
         if not _is_known(name):
-            way_out = _WAYS_OUT.get(name, "a file without it: export it anew with that turned off")
-            raise BadInput(file, "required extension", name, way_out)
+            splats = "a mesh of triangles: splats have no surface"
+            plain = "a file without it: export it anew with that extension turned off"
+            raise BadInput(
+                file, "required extension", name, splats if "gaussian_splat" in name else plain
+            )
 
 
 def unread(document: dict[str, Any]) -> list[str]:

@@ -42,6 +42,8 @@ def document_notes(
     entries = [*document.get("nodes", ()), *_objects(document, "materials")]
     if lods := sum("MSFT_lod" in (entry.get("extensions") or ()) for entry in entries):
         said.append(f"{_many(lods, 'entry', 'entries')} with levels of detail: the finest is read.")
+    if _extension(document, "CESIUM_RTC"):
+        said.append("The centre of CESIUM_RTC is not added: positions are relative to it.")
     if names := unread(document):
         said.append(f"Extensions that are not read: {_listed(names)}.")
     return said

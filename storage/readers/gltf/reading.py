@@ -14,7 +14,7 @@ from storage.readers.gltf.assembly import Assembly
 from storage.readers.gltf.buffers import Buffers
 from storage.readers.gltf.container import opened
 from storage.readers.gltf.document import checked
-from storage.readers.gltf.extensions import check_version_and_extensions
+from storage.readers.gltf.extensions import check_required, check_version
 from storage.readers.gltf.notes import document_notes, mesh_notes
 from storage.readers.gltf.scene_tree import groups, scene_tree, world_matrices
 from storage.readers.gltf.sizes import check_sizes
@@ -60,8 +60,9 @@ def read_gltf(file: Path) -> GltfFile:
     memory, whose buffers are missing or on the network, and that requires an unknown extension.
     """
     container = opened(file)
+    check_version(file, container.description)
     document = checked(file, container.description)
-    check_version_and_extensions(file, document)
+    check_required(file, document)
     buffers = Buffers(file, document, container)
     accessors = Accessors(buffers)
     tree = scene_tree(file, document)
