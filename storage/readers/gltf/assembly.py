@@ -95,24 +95,23 @@ class Assembly:
             vertices += instances * count
         all_corners = np.concatenate(corners)
         sets = sorted({number for part in placed for number in part.geometry.uvs})
-        uvs = {number: self._uvs(number) for number in sets}
-        complete = bool(placed) and all(0 in part.geometry.uvs for part in placed)
+        uvs = {number: self._uvs(number, 0.0) for number in sets}
         mesh = PolygonMesh(
             np.concatenate(positions),
             np.full(len(all_corners) // 3, 3, np.int64),
             all_corners,
-            uvs[0] if complete else None,
+            self._uvs(0, np.nan) if 0 in sets else None,
             np.concatenate(parts) if parts else np.zeros(0, np.int64),
             self._colours(),
             notes,
         )
         return mesh, uvs
 
-    def _uvs(self, number: int) -> NDArray[np.float64]:
+    def _uvs(self, number: int, missing: float) -> NDArray[np.float64]:
         pieces = [
             part.geometry.uvs[number][part.triangles.ravel()]
             if number in part.geometry.uvs
-            else np.zeros((part.triangles.size, 2))
+            else np.full((part.triangles.size, 2), missing)
             for part in self._placed
         ]
         return np.concatenate(pieces)

@@ -26,8 +26,8 @@ class GltfFile:
     """What a glTF's scene shows.
 
     mesh: all triangles where the nodes place them; ``parts`` are rows of ``primitives``;
-    ``corner_uvs`` is TEXCOORD_0, None unless each primitive has it; ``corner_colours`` is COLOR_0,
-    1 where a primitive has none.
+    ``corner_uvs`` is TEXCOORD_0, (nan, nan) where a primitive has none; ``corner_colours`` is
+    COLOR_0, 1 where a primitive has none; both None where no primitive has any.
     primitives: the JSON of each primitive of the file, of one mesh after the other.
     document: the whole JSON; what this reader reads of it is checked, materials are not.
     uvs: by the number of their set, of each corner (corners, 2) float64 with v from the bottom; 0

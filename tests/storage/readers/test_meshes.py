@@ -247,7 +247,8 @@ def test_glb_where_one_mesh_has_no_texture_coordinates(tmp_path: Path) -> None:
     nodes: list[dict[str, Any]] = [{"mesh": 0}, {"mesh": 1, "translation": [3, 0, 0]}]
     (tmp_path / "some.glb").write_bytes(glb_bytes(nodes, (True, False)))
     mesh = read_mesh(tmp_path / "some.glb")
-    assert mesh.uvs is None
+    assert mesh.uvs is not None
+    np.testing.assert_array_equal(np.isnan(mesh.uvs).any(axis=1), mesh.vertices[:, 0] > 2)
     assert len(mesh.vertices) == 8
 
 
