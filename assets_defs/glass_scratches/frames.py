@@ -91,10 +91,11 @@ def _solid_of_file(path: Path, up: str) -> Solid:
 
     from pipelines.geometry.meshes import y_up_to_z_up
     from pipelines.geometry.solids import make_solid
+    from storage.readers.gltf import SUFFIXES
     from storage.readers.meshes import read_mesh
 
     vertices, triangles, _ = read_mesh(path)
-    if up == "y" or (up == "auto" and path.suffix.lower() == ".glb"):
+    if up == "y" or (up == "auto" and path.suffix.lower() in SUFFIXES):
         vertices = y_up_to_z_up(vertices)
     vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     vertices /= np.linalg.norm(vertices, axis=1).max()

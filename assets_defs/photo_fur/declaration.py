@@ -47,7 +47,7 @@ FUR = System(
             builtin=(SQUARE, "sphere", "teapot", "teapot-large"),
             examples=("teapot",),
             default="teapot",
-            suffixes=(".ply", ".obj", ".glb"),
+            suffixes=(".ply", ".obj", ".stl", ".glb", ".gltf"),
             check=_check_mesh,
         ),
     ),

@@ -67,11 +67,12 @@ def _read(source: Source, settings: MeshSettings) -> Mesh:
     """A mesh of the user's, upright, or a built-in one."""
     from pipelines.geometry import shapes
     from pipelines.geometry.meshes import make_mesh, y_up_to_z_up
+    from storage.readers.gltf import SUFFIXES
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
         vertices, triangles, uvs = read_mesh(source.path)
-        if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
+        if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() in SUFFIXES):
             vertices = y_up_to_z_up(vertices)
         return make_mesh(vertices, triangles, uvs)
     return {

@@ -60,7 +60,7 @@ SSDF = System(
             builtin=SCENES,
             examples=("teapot",),
             default="teapot",
-            suffixes=(".ply", ".obj", ".glb"),
+            suffixes=(".ply", ".obj", ".stl", ".glb", ".gltf"),
             check=_check_scene,
         ),
         Dimension(

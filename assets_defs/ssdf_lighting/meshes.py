@@ -44,13 +44,14 @@ def load_scene(source: Source, settings: SceneSettings) -> Scene:
     from pipelines.geometry.meshes import y_up_to_z_up
     from pipelines.ssdf_lighting.light.microfacets import Materials
     from pipelines.ssdf_lighting.scene import built_in_scene, make_scene
+    from storage.readers.gltf import SUFFIXES
     from storage.readers.scenes import read_scene
 
     if source.path is None:
         return built_in_scene(source.key, settings.segments, settings.floor)
     read = read_scene(source.path)
     vertices = read.vertices
-    if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() == ".glb"):
+    if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() in SUFFIXES):
         vertices = y_up_to_z_up(vertices)
     materials = Materials(
         np.array([material.albedo for material in read.materials]),

@@ -10,4 +10,6 @@ from __future__ import annotations
 
 from storage.readers.gltf.reading import GltfFile, read_gltf
 
-__all__ = ["GltfFile", "read_gltf"]
+__all__ = ["SUFFIXES", "GltfFile", "read_gltf"]
+
+SUFFIXES = (".glb", ".gltf")
