@@ -32,6 +32,7 @@ from assets_defs.picture_links import (
     picture_port,
 )
 from assets_defs.picture_server import PictureServer
+from assets_defs.system import NOTES
 from assets_defs.workspace import Workspace
 from storage.versions import Slot
 from tsuya import web_ui
@@ -79,6 +80,12 @@ def test_a_figure_called_like_a_picture_does_not_hide_it(tmp_path: Path) -> None
     assert (shown["frames"].value, shown["coverage"].value) == (6, 0.5)
     assert shown["picture: frames"].value.startswith("![picture](data:image/jpeg;base64,")
     assert isinstance(shown["full size: frames"], dg.UrlMetadataValue)
+
+
+def test_notes_are_a_list_in_the_web_ui_where_there_are_some() -> None:
+    shown = dagster_metadata({NOTES: ("3 texels were filled.", "1 layer was left out.")})
+    assert shown[NOTES].value == "- 3 texels were filled.\n- 1 layer was left out."
+    assert dagster_metadata({NOTES: ()}) == {}
 
 
 @pytest.mark.parametrize("name", ["picture: frames", "full size: frames"])

@@ -72,6 +72,22 @@ def test_a_run_reports_figures_sizes_and_versions(made: dict[str, Any], home: Pa
     assert 0 < sum(asset["seconds"] for asset in assets.values()) <= made["seconds"]
 
 
+def test_what_was_mended_is_said_and_stays_with_the_version(home: Path) -> None:
+    egg = Path(__file__).parents[2] / "benchmarks/captures/files/obj_inside_out_closed.obj"
+    given = ("run", "photo_fur", "--photo", "grass", "--preset", "test")
+    plain = tsuya(*given, "--mesh", str(egg))
+    assert plain.exit_code == 0, plain.output
+    key = "photo_fur/shell_mesh/obj_inside_out_closed-obj"
+    (note,) = (line for line in plain.stdout.splitlines() if line.startswith(f"{key}: "))
+    assert "turned over" in note
+    said = tsuya(*given, "--mesh", "obj_inside_out_closed-obj", "--json")
+    reports = json.loads(said.stdout.splitlines()[-1])["assets"]
+    (report,) = (report for report in reports if report["key"] == key)
+    assert report["notes"] == [note.removeprefix(f"{key}: ")]
+    assert note in tsuya("status").stdout.splitlines()
+    assert tsuya("remove", "photo_fur/obj_inside_out_closed-obj", "--yes").exit_code == 0
+
+
 def test_a_second_run_says_in_a_table_that_all_is_current(made: dict[str, Any]) -> None:
     result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square")
     assert result.exit_code == 0
