@@ -77,7 +77,9 @@ def scene_of(scene_mesh: xr.Dataset) -> Scene:
         scene_mesh["normals"].values,
         scene_mesh["part"].values,
         Materials(
-            *(scene_mesh[name].values for name in ("albedo", "specular", "roughness")),
+            scene_mesh["albedo"].values,
+            scene_mesh["specular"].values,
+            scene_mesh["roughness"].values,
             scene_mesh["tint"].values if "tint" in scene_mesh else None,
         ),
         scene_mesh["middle"].values,

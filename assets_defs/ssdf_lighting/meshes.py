@@ -12,6 +12,7 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.ssdf_lighting.datasets import scene_dataset
 from assets_defs.ssdf_lighting.declaration import SSDF
+from assets_defs.ssdf_lighting.file_materials import materials_of, textures_of_file
 from assets_defs.system import NOTES, Result
 from pipelines.ssdf_lighting import figures
 from storage.schemas import ssdf_lighting as schemas
@@ -28,38 +29,37 @@ class SceneSettings(Settings):
         20, ge=4, le=160, description="Built-in scenes: segments of a patch's edge"
     )
     floor: int = Field(64, ge=8, le=512, description="Built-in scenes: squares along the floor")
+    edge: float = Field(
+        0.05,
+        ge=0.005,
+        le=2.0,
+        description="Your mesh: edges longer than this many scene radii are halved",
+    )
     up: Literal["auto", "y", "z"] = Field(
-        "auto", description="Your mesh's upward axis; auto: y for GLB, as glTF has it, else z"
+        "auto", description="Your mesh's upward axis; auto: y for glTF, which says so, else z"
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"segments": 6, "floor": 16},
+        "test": {"segments": 6, "floor": 16, "edge": 0.2},
     }
 
 
 def load_scene(source: Source, settings: SceneSettings) -> Scene:
     """A built-in scene, or a user's, repaired. Raises ValueError, BadInput for one that is none."""
-    import numpy as np
-
     from pipelines.geometry.meshes import y_up_to_z_up
-    from pipelines.ssdf_lighting.light.microfacets import Materials
     from pipelines.ssdf_lighting.scene import built_in_scene, make_scene
-    from storage.readers.gltf import SUFFIXES
     from storage.readers.scenes import read_scene
 
     if source.path is None:
         return built_in_scene(source.key, settings.segments, settings.floor)
     read = read_scene(source.path)
     vertices = read.vertices
-    if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() in SUFFIXES):
+    is_gltf = source.path.suffix.lower() in (".glb", ".gltf")
+    if settings.up == "y" or (settings.up == "auto" and is_gltf):
         vertices = y_up_to_z_up(vertices)
-    materials = Materials(
-        np.array([material.albedo for material in read.materials]),
-        np.clip([material.specular for material in read.materials], 0.0, 0.99),
-        np.clip([material.roughness for material in read.materials], 0.05, 1.0),
-    )
+    materials, textures = materials_of(read), textures_of_file(read)
     try:
-        scene = make_scene(vertices, read.triangles, read.part, materials)
+        scene = make_scene(vertices, read.triangles, read.part, materials, textures, settings.edge)
     except ValueError as error:
         raise ValueError(f"{source.name}: {error}") from error
     return scene._replace(notes=(*read.notes, *scene.notes))

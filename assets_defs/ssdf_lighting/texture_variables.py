@@ -9,10 +9,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipelines.ssdf_lighting.light.microfacets import Materials
-    from pipelines.ssdf_lighting.surface_textures import SurfaceTextures, Texture
+    from pipelines.ssdf_lighting.surface_textures import SurfaceTextures, Texture, Wrap
 
 _KINDS = ("colour", "surface", "normal")
-_WRAPS = ("repeat", "mirror", "clamp")
+_WRAPS: tuple[Wrap, ...] = ("repeat", "mirror", "clamp")
 
 
 def tint_variable(materials: Materials) -> Mapping[str, Any]:
@@ -32,7 +32,7 @@ def texture_variables(textures: SurfaceTextures) -> Mapping[str, Any]:
         for kind, name in enumerate(_KINDS)
         if getattr(material, name) is not None
     ]
-    factors = [[*m.base, m.metal, m.specular, m.roughness, m.bend] for m in textures.materials]
+    factors = [[*m.base, m.metal, *m.specular, m.roughness, m.bend] for m in textures.materials]
     texels = [texture.texels.reshape(-1, 3) for *_, texture in made]
     wraps = [[_WRAPS.index(wrap) for wrap in texture.wrap] for *_, texture in made]
     sizes = [texture.texels.shape[1::-1] for *_, texture in made]
@@ -62,12 +62,10 @@ def textures_of(scene_mesh: xr.Dataset) -> SurfaceTextures:
     for row, (number, factors) in enumerate(
         zip(scene_mesh["varying"].values, scene_mesh["factors"].values, strict=True)
     ):
-        red, green, blue, metal, specular, roughness, bend = factors.tolist()
-        maps = [found.get((row, kind)) for kind in range(len(_KINDS))]
-        base = (red, green, blue)
-        materials.append(
-            TexturedMaterial(int(number), base, metal, specular, roughness, *maps, bend)
-        )
+        first, second, third, metal, red, green, blue, roughness, bend = factors.tolist()
+        colour, surface, normal = (found.get((row, kind)) for kind in range(len(_KINDS)))
+        look = (first, second, third), metal, (red, green, blue), roughness
+        materials.append(TexturedMaterial(int(number), *look, colour, surface, normal, bend))
     return SurfaceTextures(scene_mesh["uvs"].values, scene_mesh["colours"].values, tuple(materials))
 
 

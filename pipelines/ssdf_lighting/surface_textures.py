@@ -38,8 +38,8 @@ class TexturedMaterial(NamedTuple):
     """What a part is made of that has textures or colours of vertices.
 
     row: of the scene's materials, where the same material is as it is on average.
-    base: (3,) linear colour; metal, specular, roughness: in [0, 1]; specular is F0 of what is no
-        metal, and Beckmann's slope is the roughness squared.
+    base: (3,) linear colour; specular: (3,) F0 of what is no metal; metal, roughness: in [0, 1];
+        Beckmann's slope is the roughness squared.
     colour: sRGB codes; times ``base``.
     surface: red times ``specular``, green times ``roughness``, blue times ``metal``.
     normal: 2 t - 1 along u, along v and along the normal; the first two times ``bend``.
@@ -48,7 +48,7 @@ class TexturedMaterial(NamedTuple):
     row: int
     base: tuple[float, float, float]
     metal: float
-    specular: float
+    specular: tuple[float, float, float]
     roughness: float
     colour: Texture | None = None
     surface: Texture | None = None
@@ -58,7 +58,7 @@ class TexturedMaterial(NamedTuple):
     @property
     def has_gloss(self) -> bool:
         """Whether any place of it reflects like a mirror, however blurred."""
-        return self.specular > 0 or self.metal > 0
+        return max(self.specular) > 0 or self.metal > 0
 
 
 class SurfaceTextures(NamedTuple):
@@ -108,20 +108,20 @@ class Sampler:
         made = self.material
         count = len(uvs)
         base = np.array(made.base) * colours
-        specular, roughness = np.full(count, made.specular), np.full(count, made.roughness)
+        specular, roughness = np.ones(count), np.full(count, made.roughness)
         metal = np.full(count, made.metal)
         bumps, spread = np.tile([0.0, 0.0, 1.0], (count, 1)), np.zeros(count)
         if made.colour is not None:
             base = base * _sampled(made.colour, self._colour, uvs, footprint, _LINEAR)
         if made.surface is not None:
             red, green, blue = _sampled(made.surface, self._surface, uvs, footprint, _PLAIN).T
-            specular, roughness, metal = specular * red, roughness * green, metal * blue
+            specular, roughness, metal = red, roughness * green, metal * blue
         if made.normal is not None:
             bumps = 2 * _sampled(made.normal, self._normal, uvs, footprint, _PLAIN) - 1
             size = np.linalg.norm(bumps, axis=1)
             spread = made.bend**2 * np.maximum(_NO_SPREAD - size, 0) / np.maximum(size, 0.1)
             bumps = bumps * [made.bend, made.bend, 1.0]
-        reflected = specular[:, None] * (1 - metal)[:, None] + base * metal[:, None]
+        reflected = (specular * (1 - metal))[:, None] * made.specular + base * metal[:, None]
         mean = reflected.mean(axis=1)
         return Looks(
             np.clip(base * (1 - metal)[:, None], 0.0, 1.0),

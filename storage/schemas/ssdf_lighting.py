@@ -27,7 +27,7 @@ _TEXTURES = {
         ("varying", "factor"),
         "float64",
         "1",
-        "Base colour, metalness, F0 of what is no metal, roughness (root of the slope), bend",
+        "Base colour (3), metalness, F0 of what is no metal (3), roughness (root of m), bend",
         optional=True,
     ),
     "texture_of": Variable(

@@ -16,7 +16,7 @@ in vec3 shadingOut;
 in vec3 placeOut;
 #if TEXTURED
 uniform vec4 factors;                  // base colour, metalness
-uniform vec4 finish;                   // specular, roughness, how much the normals bend
+uniform vec4 finish;                   // reflectance of what is no metal, roughness
 #if COLOUR_MAP
 uniform sampler2D colourMap;
 uniform vec4 colourPlace, colourLimits;
@@ -27,7 +27,7 @@ uniform vec4 surfacePlace, surfaceLimits;
 #endif
 #if NORMAL_MAP
 uniform sampler2D normalMap;
-uniform vec4 normalPlace, normalLimits;
+uniform vec4 normalPlace, normalLimits;  // place.w: how much the normals bend
 #endif
 in vec3 paintOut;
 in vec4 mappingsOut;
@@ -56,11 +56,11 @@ Look seenLook() {
 #if SURFACE_MAP
   shares = texelAt(surfaceMap, mappingsOut, surfacePlace, surfaceLimits);
 #endif
-  Look seen = lookOf(normal, base, factors.w * shares.b, finish.x * shares.r, finish.y * shares.g);
+  Look seen = lookOf(normal, base, factors.w * shares.b, finish.rgb * shares.r, finish.w * shares.g);
 #if NORMAL_MAP
   vec3 bump = 2.0 * texelAt(normalMap, mappingsOut, normalPlace, normalLimits) - 1.0;
-  seen.roughness = roughenedSlope(seen.roughness, length(bump), finish.z);
-  bump.xy *= finish.z;
+  seen.roughness = roughenedSlope(seen.roughness, length(bump), normalPlace.w);
+  bump.xy *= normalPlace.w;
   vec2 mapping = normalPlace.z < 0.5 ? mappingsOut.xy : mappingsOut.zw;
   seen.normal = bentNormal(normal, bump, dFdx(placeOut), dFdy(placeOut), dFdx(mapping),
                            dFdy(mapping));

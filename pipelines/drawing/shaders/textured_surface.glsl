@@ -17,7 +17,7 @@ vec3 texelAt(sampler2D map, vec4 mappings, vec4 place, vec4 limits) {
   return texture(map, clamp(mapping * place.xy, limits.xy, limits.zw)).rgb;
 }
 
-Look lookOf(vec3 normal, vec3 base, float metal, float specular, float roughness) {
+Look lookOf(vec3 normal, vec3 base, float metal, vec3 specular, float roughness) {
   float rest = clamp(1.0 - metal, 0.0, 1.0);
   vec3 reflected = specular * rest + base * metal;
   float mean = dot(reflected, vec3(1.0 / 3.0));

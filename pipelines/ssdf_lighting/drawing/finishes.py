@@ -101,7 +101,7 @@ def _textured(
     samplers: dict[str, Any] = {}
     uniforms = {
         "factors": [*material.base, material.metal],
-        "finish": [material.specular, material.roughness, material.bend, 0.0],
+        "finish": [*material.specular, material.roughness],
     }
     values: dict[str, Value] = {
         "TEXTURED": True,
@@ -113,6 +113,7 @@ def _textured(
         values[f"{name.upper()}_MAP"] = given is not None
         if given is not None:
             sampler, place, limits = _map(given, srgb=name == "colour")
+            place[3] = material.bend
             samplers[f"{name}Map"] = sampler
             uniforms |= {f"{name}Place": place, f"{name}Limits": limits}
     if material.has_gloss:
