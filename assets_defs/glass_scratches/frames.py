@@ -75,31 +75,34 @@ def glass_object(settings: ObjectSettings, source: Source) -> Result:
     from assets_defs.glass_scratches.datasets import solid_dataset
     from pipelines.geometry.solid_shapes import glass_teapot, plate
 
+    notes: tuple[str, ...] = ()
     if source.path is not None:
-        solid = _solid_of_file(source.path, settings.up)
+        solid, notes = _solid_of_file(source.path, settings.up)
     elif source.key == "teapot":
         solid = glass_teapot(settings.segments, settings.thickness)
     else:
         solid = plate(1.5, 1.1, settings.thickness)
     dataset = solid_dataset(solid, source.name)
-    return dataset, {"vertices": len(solid.vertices), "triangles": len(solid.triangles)}
+    shown = {"vertices": len(solid.vertices), "triangles": len(solid.triangles), NOTES: notes}
+    return dataset, shown
 
 
-def _solid_of_file(path: Path, up: str) -> Solid:
-    """A closed mesh around the origin, of radius 1."""
+def _solid_of_file(path: Path, up: str) -> tuple[Solid, tuple[str, ...]]:
+    """A closed mesh around the origin, of radius 1, and what was mended, a sentence each."""
     import numpy as np
 
     from pipelines.geometry.meshes import y_up_to_z_up
-    from pipelines.geometry.solids import make_solid
+    from pipelines.geometry.solids import make_closed_mesh, smooth_solid
     from storage.readers.gltf import SUFFIXES
     from storage.readers.meshes import read_mesh
 
-    vertices, triangles, _ = read_mesh(path)
+    vertices, triangles, _, notes = read_mesh(path)
     if up == "y" or (up == "auto" and path.suffix.lower() in SUFFIXES):
         vertices = y_up_to_z_up(vertices)
     vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     vertices /= np.linalg.norm(vertices, axis=1).max()
-    return make_solid(vertices, triangles)
+    closed = make_closed_mesh(vertices, triangles)
+    return smooth_solid(closed), (*notes, *closed.notes)
 
 
 # ---- glass_frames ----------------------------------------------------------------------------

@@ -26,8 +26,14 @@ def _check_photograph(source: Source, settings: Mapping[str, Any]) -> None:
 
 
 def _check_mesh(source: Source, settings: Mapping[str, Any]) -> None:
+    from pipelines.geometry.repair import repair_mesh
+
     if source.path is not None:
-        read_mesh(source.path)
+        vertices, triangles, *_ = read_mesh(source.path)
+        try:
+            repair_mesh(vertices, triangles)
+        except ValueError as error:
+            raise ValueError(f"{source.name}: {error}") from error
 
 
 FUR = System(

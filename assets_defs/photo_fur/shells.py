@@ -12,13 +12,13 @@ from assets_defs.photo_fur.datasets import shell_mesh_dataset
 from assets_defs.photo_fur.declaration import FUR, SQUARE, Layers
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Result
+from assets_defs.system import NOTES, Result
 from pipelines.photo_fur import figures
 from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
-    from pipelines.geometry.meshes import Mesh
+    from pipelines.geometry.mended_meshes import MendedMesh
 
 
 class MeshSettings(Settings):
@@ -63,24 +63,32 @@ def _texture_stretch(version: StoredVersion) -> float:
     )
 
 
-def _read(source: Source, settings: MeshSettings) -> Mesh:
-    """A mesh of the user's, upright, or a built-in one."""
+def _outward_share(version: StoredVersion) -> float:
+    dataset = version.dataset.load()
+    return figures.outward_share(dataset["vertices"].values, dataset["triangles"].values)
+
+
+def _read(source: Source, settings: MeshSettings) -> MendedMesh:
+    """A mesh of the user's, upright and repaired, or a built-in one."""
     from pipelines.geometry import shapes
-    from pipelines.geometry.meshes import make_mesh, y_up_to_z_up
+    from pipelines.geometry.mended_meshes import MendedMesh, mend_mesh
+    from pipelines.geometry.meshes import y_up_to_z_up
     from storage.readers.gltf import SUFFIXES
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
-        vertices, triangles, uvs = read_mesh(source.path)
+        vertices, triangles, uvs, notes = read_mesh(source.path)
         if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() in SUFFIXES):
             vertices = y_up_to_z_up(vertices)
-        return make_mesh(vertices, triangles, uvs)
-    return {
+        mended = mend_mesh(vertices, triangles, uvs)
+        return mended._replace(notes=(*notes, *mended.notes))
+    built_in = {
         SQUARE: lambda: shapes.square(32),
         "sphere": lambda: shapes.sphere(64),
         "teapot": lambda: shapes.teapot(8),
         "teapot-large": lambda: shapes.teapot(33),
     }[source.key]()
+    return MendedMesh(built_in, ())
 
 
 @FUR.asset(
@@ -102,15 +110,23 @@ def _read(source: Source, settings: MeshSettings) -> Mesh:
             at_most=3.0,
             change=0.1,
         ),
+        Check(
+            "outward_share",
+            "Share of the surface, as seen from all around, whose hair stands towards the viewer: "
+            "half of a sheet, all of a body, nothing of one that is inside out.",
+            _outward_share,
+            at_least=0.1,
+            change=0.02,
+        ),
     ),
 )
 def shell_mesh(settings: MeshSettings, source: Source) -> Result:
     """Offset the mesh's vertices along the normals, one set a layer."""
     from pipelines.photo_fur.shells import make_shell_mesh
 
-    mesh = _read(source, settings)
+    mesh, notes = _read(source, settings)
     shells = make_shell_mesh(
         mesh, settings.layers, thickness=settings.thickness, repeats=settings.repeats
     )
-    shown = {"vertices": len(mesh.vertices), "triangles": len(mesh.triangles)}
+    shown = {"vertices": len(mesh.vertices), "triangles": len(mesh.triangles), NOTES: notes}
     return shell_mesh_dataset(shells, source.name), shown

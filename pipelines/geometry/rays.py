@@ -130,6 +130,42 @@ def occluded(
     return blocked
 
 
+class Seen(NamedTuple):
+    """What straight lines from outside a mesh meet first: ``triangle`` (N,) int64, its row, and
+    ``direction`` (N, 3), the unit vector along the line."""
+
+    triangle: NDArray[np.int64]
+    direction: NDArray[np.float64]
+
+
+def seen_from_outside(vertices: ArrayLike, triangles: ArrayLike, lines: int) -> Seen:
+    """Look at a mesh from all around: the same ``lines`` for equal meshes, evenly over directions
+    and over the sphere around the mesh; those that miss are left out.
+
+    vertices (V, 3), in any unit and anywhere; triangles (F, 3) integers. Of a closed surface each
+    part is met as often as it is seen; of a sheet, either side.
+
+    >>> from pipelines.geometry.shapes import square
+    >>> flat = square()
+    >>> seen = seen_from_outside(flat.vertices, flat.triangles, 1000)
+    >>> bool(0.4 < (seen.direction[:, 2] < 0).mean() < 0.6)
+    True
+    """
+    points = np.asarray(vertices, np.float64)
+    low, high = points.min(axis=0), points.max(axis=0)
+    centred = points - (low + high) / 2
+    radius = float(np.linalg.norm(centred, axis=1).max())
+    random = np.random.default_rng(0)
+    way = random.normal(size=(lines, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    across = np.cross(way, random.normal(size=(lines, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    start = np.sqrt(random.random((lines, 1))) * across - 2.0 * way
+    scene = build_scene(centred / (radius or 1.0), triangles)
+    triangle = first_hits(scene, start, way).triangle
+    return Seen(triangle[triangle >= 0], way[triangle >= 0])
+
+
 def _broadcast_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     starts, ways = np.asarray(origins), np.asarray(directions)
     fits = all(a.ndim in (1, 2) and a.shape[-1] == 3 for a in (starts, ways))

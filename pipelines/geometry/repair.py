@@ -21,6 +21,7 @@ from pipelines.geometry.mesh_edges import (
     mesh_edges,
 )
 from pipelines.geometry.meshes import check_mesh
+from pipelines.geometry.rays import seen_from_outside
 
 # More pairs of vertices within the tolerance than this, and than vertices, are not listed at once.
 _MANY_PAIRS = 1_000_000
@@ -28,6 +29,13 @@ _MANY_PAIRS = 1_000_000
 # Twice a triangle's area over the squared longest side, and a closed surface's volume over the
 # sum of its parts' volumes: what rounding leaves of nothing. Slivers and bubbles have far more.
 _NOTHING = 1e-12
+
+# Straight lines from afar, and the share of those that meet an open piece in front up to which it
+# is inside out. Into a scan's holes one looks with a hundredth of them, into a box without its lid
+# with a sixth, and a sheet is met on either side by half of them.
+_LINES = 1 << 15
+_SELDOM = 0.05
+_LEAST_LINES = 20
 
 _EPSILON = float(np.finfo(np.float64).eps)
 _TINY = float(np.finfo(np.float64).tiny)
@@ -39,12 +47,15 @@ class RepairedMesh(NamedTuple):
     vertices: (V', 3) float64, each position once, all used, in the given order.
     triangles: (F', 3) int32, counter-clockwise from outside.
     kept: (F',) int64, the row of the given triangle that each is, ascending.
+    corners: (F', 3) int64, the given vertex that each corner is: what files say of vertices that
+        are one here (texture coordinates, colours) is found by it.
     notes: what was done or found, a sentence for each kind, with counts.
     """
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
     kept: NDArray[np.int64]
+    corners: NDArray[np.int64]
     notes: tuple[str, ...]
 
 
@@ -64,8 +75,9 @@ def repair_mesh(
       together by such edges is a piece; edges in more than two triangles separate pieces.
     - A closed piece, without borders, faces outwards: it has positive volume. So cavities face
       into the material around them; `solids.make_closed_mesh` knows better. An open piece, and a
-      closed one that is flat, faces where most of its area did. A piece with one side only (a
-      Moebius strip) stays as it is.
+      closed one that is flat, faces where most of its area did, unless that side is hardly ever
+      seen from outside the mesh (a scan with holes that is inside out): it is turned over then. A
+      piece with one side only (a Moebius strip) stays as it is.
 
     Triangles keep their order and their first corner; those that are turned over have their second
     and third swapped. A repaired mesh is not changed by another repair.
@@ -81,18 +93,32 @@ def repair_mesh(
     >>> mesh.triangles.shape, mesh.notes[0]
     ((8, 3), "1 triangle of open pieces turned over to face as most of their piece's area.")
     """
+    mesh = clean_mesh(vertices, triangles, tolerance=tolerance)
+    faces, notes = mesh.triangles.astype(np.int64), list(mesh.notes)
+    turned = _orient(mesh.vertices, faces, notes)
+    corners = mesh.corners.copy()
+    flip_triangles(corners, turned)
+    return mesh._replace(triangles=faces.astype(np.int32), corners=corners, notes=tuple(notes))
+
+
+def clean_mesh(
+    vertices: ArrayLike, triangles: ArrayLike, *, tolerance: float = 1e-7, flat: bool = False
+) -> RepairedMesh:
+    """Merge vertices and drop triangles as `repair_mesh` does, with the same arguments and errors,
+    and leave all facing as they do; with ``flat``, keep triangles without area whose corners are
+    three: dropped from a closed surface they would leave slits."""
     points, faces = np.array(vertices, np.float64), np.array(triangles)
     check_mesh(points, faces)
     if not 0 <= tolerance < np.inf:
         raise ValueError(f"tolerance is {tolerance}; expected a finite number of at least 0")
     notes: list[str] = []
-    points, faces = _merged(points, faces.astype(np.int64), tolerance, notes)
-    kept = _worth_keeping(points, faces, notes)
+    given = faces.astype(np.int64)
+    points, faces = _merged(points, given, tolerance, notes)
+    kept = _worth_keeping(points, faces, flat, notes)
     if len(kept) == 0:
         raise ValueError("no triangle has an area; expected at least one that has")
     points, faces = _compact(points, faces[kept])
-    _orient(points, faces, notes)
-    return RepairedMesh(points, faces.astype(np.int32), kept, tuple(notes))
+    return RepairedMesh(points, faces.astype(np.int32), kept, given[kept], tuple(notes))
 
 
 # --- Merging and dropping -----------------------------------------------------------------------
@@ -145,12 +171,14 @@ def _joined(
 
 
 def _worth_keeping(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: list[str]
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], flat: bool, notes: list[str]
 ) -> NDArray[np.int64]:
-    """Rows of the triangles with an area, each set of three corners once."""
-    kept = np.flatnonzero(_have_areas(vertices, triangles))
-    if flat := len(triangles) - len(kept):
-        things = _count(flat, "triangle", "triangles")
+    """Rows of the triangles with an area, or with three corners if ``flat``, each set of three
+    corners once."""
+    three = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    kept = np.flatnonzero(three if flat else _have_areas(vertices, triangles))
+    if dropped := len(triangles) - len(kept):
+        things = _count(dropped, "triangle", "triangles")
         notes.append(f"{things} dropped: repeated corners or no area.")
     corners = np.sort(triangles[kept], axis=1)
     kept = kept[np.sort(first_rows(_equal_rows(corners)))]
@@ -198,25 +226,36 @@ def _equal_rows(rows: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.int
 # --- Orienting ----------------------------------------------------------------------------------
 
 
-def _orient(vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: list[str]) -> None:
-    """Turn triangles over, in place, as `repair_mesh` says."""
+def _orient(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: list[str]
+) -> NDArray[np.bool_]:
+    """Turn triangles over, in place, as `repair_mesh` says; (F,): which of them."""
     edge = mesh_edges(triangles)
     piece, turned, one_sided = consistent_orientation(edge.pairs(), edge.forwards)
     turned &= ~one_sided[piece]
-    closed = _closed(edge, piece, turned) & ~one_sided
     area, volume = _areas_and_volumes(vertices, triangles, piece)
     volume = np.where(turned, -volume, volume)
+    closed = _closed(edge, piece, turned) & ~one_sided
     signed, unsigned = np.bincount(piece, volume), np.bincount(piece, np.abs(volume))
     solid = closed & (np.abs(signed) > _NOTHING * unsigned)
     majority = np.bincount(piece, np.where(turned, -area, area))
     wrong = np.where(solid, signed < 0, majority < 0) & ~one_sided
     turned ^= wrong[piece]
     flip_triangles(triangles, turned)
+    open_ones = ~solid & ~one_sided
+    inside_out = np.zeros(len(solid), bool)
+    if open_ones.any():
+        inside_out = open_ones & _hardly_seen_in_front(vertices, triangles, piece)
+        flip_triangles(triangles, inside_out[piece])
+        turned ^= inside_out[piece]
 
     if outwards := int((turned & solid[piece]).sum()):
         things = _count(outwards, "triangle", "triangles")
         notes.append(f"{things} of closed pieces turned over to face outwards.")
-    if agreeing := int((turned & ~solid[piece]).sum()):
+    if outwards := int((turned & inside_out[piece]).sum()):
+        things = _count(outwards, "triangle", "triangles")
+        notes.append(f"{things} of pieces with small openings turned over to face outwards.")
+    if agreeing := int((turned & (open_ones & ~inside_out)[piece]).sum()):
         things = _count(agreeing, "triangle", "triangles")
         notes.append(f"{things} of open pieces turned over to face as most of their piece's area.")
     if strips := int(one_sided.sum()):
@@ -228,6 +267,22 @@ def _orient(vertices: NDArray[np.float64], triangles: NDArray[np.int64], notes: 
     if border := int((edge.uses == 1).sum()):
         things = _count(border, "border edge", "border edges")
         notes.append(f"the mesh is open along {things}.")
+    return turned
+
+
+def _hardly_seen_in_front(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], piece: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(pieces,): whether those who look at the mesh from all around see the piece from behind."""
+    seen = seen_from_outside(vertices, triangles, _LINES)
+    a, b, c = (vertices[triangles[seen.triangle, corner]] for corner in range(3))
+    front = np.einsum("ni,ni->n", np.cross(b - a, c - a), seen.direction) < 0
+    pieces = int(piece.max()) + 1
+    number = piece[seen.triangle]
+    met = np.bincount(number, minlength=pieces)
+    in_front = np.bincount(number[front], minlength=pieces)
+    hardly: NDArray[np.bool_] = (met >= _LEAST_LINES) & (in_front <= _SELDOM * met)
+    return hardly
 
 
 def _closed(

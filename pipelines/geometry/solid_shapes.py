@@ -187,4 +187,4 @@ def _as_solid(made: Manifold) -> Solid:
     normals = table[corners, 3:]
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     closed = make_closed_mesh(table[:, :3] - TEAPOT_CENTRE, same[corners])
-    return Solid(*closed, normals.astype(np.float32))
+    return Solid(closed.vertices, closed.triangles, normals.astype(np.float32))

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry.mesh_edges import consistent_orientation, flip_triangles, mesh_edges
-from pipelines.geometry.meshes import angle_weighted_normals, check_mesh
+from pipelines.geometry.meshes import angle_weighted_normals
+from pipelines.geometry.repair import clean_mesh
 
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -35,10 +36,12 @@ class Solid(NamedTuple):
 
 class ClosedMesh(NamedTuple):
     """A closed, oriented surface: ``vertices`` (V, 3) float64, each position once; ``triangles``
-    (F, 3) int32, counter-clockwise seen from outside the material."""
+    (F, 3) int32, counter-clockwise seen from outside the material; ``notes``, what was mended, a
+    sentence each."""
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
+    notes: tuple[str, ...] = ()
 
 
 # --- Closed meshes ------------------------------------------------------------------------------
@@ -47,10 +50,9 @@ class ClosedMesh(NamedTuple):
 def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     """A mesh that encloses a volume, oriented; refused where it does not.
 
-    vertices (V, 3), triangles (F, 3) integers. Vertices at equal positions are merged (files
-    split them along the seams of their texture coordinates), those in no triangle are dropped,
-    and so are triangles with two corners at one position. The others keep their order; those
-    that have to be turned over have their second and third corner swapped.
+    vertices (V, 3), triangles (F, 3) integers: merged and cleaned as by `repair.repair_mesh`, but
+    that triangles without area stay where the surface is not closed without them. The others keep
+    their order; those that have to be turned over have their second and third corner swapped.
 
     Of surfaces inside one another the outermost faces outwards, the next one into the cavity that
     it bounds, and so on by turns, however they faced. It is not checked that no surface crosses
@@ -66,9 +68,11 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     >>> bool(np.linalg.det(mesh.vertices[mesh.triangles]).sum() > 0)
     True
     """
-    points, faces = np.array(vertices, np.float64), np.array(triangles)
-    check_mesh(points, faces)
-    points, faces = _welded(points, faces)
+    mesh = clean_mesh(vertices, triangles)
+    if not _is_closed(mesh.triangles):
+        with_flat = clean_mesh(vertices, triangles, flat=True)
+        mesh = with_flat if _is_closed(with_flat.triangles) else mesh
+    points, faces = mesh.vertices, mesh.triangles.astype(np.int64)
     surface = _oriented(faces)
     parts = _signed_volumes(points, faces)
     volume = np.bincount(surface, parts)
@@ -77,11 +81,16 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     if flat.any():
         raise ValueError(
             f"{int(flat.sum())} of {len(volume)} surfaces enclose no volume; "
-            "expected surfaces around some material"
+            "expected surfaces around some material: give a sheet some thickness"
         )
     is_cavity = _depths(points, faces, surface) % 2 == 1
     flip_triangles(faces, ((volume < 0) != is_cavity)[surface])
-    return ClosedMesh(points, faces.astype(np.int32))
+    turned = int((faces != mesh.triangles).any(axis=1).sum())
+    notes = list(mesh.notes)
+    if turned:
+        things = f"{turned} triangle{'s' if turned > 1 else ''}"
+        notes.append(f"{things} turned over to face out of the material.")
+    return ClosedMesh(points, faces.astype(np.int32), tuple(notes))
 
 
 def make_solid(vertices: ArrayLike, triangles: ArrayLike, *, crease: float = 35.0) -> Solid:
@@ -91,22 +100,19 @@ def make_solid(vertices: ArrayLike, triangles: ArrayLike, *, crease: float = 35.
     triangles around the vertex that turn by at most ``crease`` degrees from the corner's own.
     Raises ValueError as `make_closed_mesh` does, and for a crease outside 0 to 180 degrees.
     """
+    return smooth_solid(make_closed_mesh(vertices, triangles), crease)
+
+
+def smooth_solid(mesh: ClosedMesh, crease: float = 35.0) -> Solid:
+    """A closed mesh with the normals that `make_solid` gives it, and the same errors."""
     if not 0 <= crease <= 180:
         raise ValueError(f"crease is {crease} degrees; expected 0 to 180")
-    mesh = make_closed_mesh(vertices, triangles)
-    return Solid(*mesh, creased_normals(*mesh, crease).astype(np.float32))
+    normals = creased_normals(mesh.vertices, mesh.triangles, crease)
+    return Solid(mesh.vertices, mesh.triangles, normals.astype(np.float32))
 
 
-def _welded(
-    vertices: NDArray[np.float64], triangles: NDArray[np.integer]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    used, number = np.unique(triangles, return_inverse=True)
-    positions, place = np.unique(vertices[used] + 0.0, axis=0, return_inverse=True)  # no -0.0
-    faces = place.reshape(-1)[number.reshape(triangles.shape)]
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    if len(faces) == 0:
-        raise ValueError("no triangle has three corners apart; expected a closed mesh")
-    return positions, faces
+def _is_closed(triangles: NDArray[np.int32]) -> bool:
+    return bool((mesh_edges(triangles.astype(np.int64)).uses == 2).all())
 
 
 def _oriented(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -119,12 +125,13 @@ def _oriented(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     if (edges.uses > 2).any():
         raise ValueError(
             f"{int((edges.uses > 2).sum())} edges are in more than two triangles; "
-            "expected two at each edge of a closed mesh"
+            "expected two at each edge of a closed mesh: join parts that touch by a Boolean union"
         )
     if (edges.uses < 2).any():
         raise ValueError(
             f"the mesh is open along {int((edges.uses < 2).sum())} border edges; "
-            "expected two triangles at each edge of a closed mesh"
+            "expected two triangles at each edge of a closed mesh: fill its holes in Blender or "
+            "MeshLab, or give a sheet some thickness"
         )
     surface, turned, one_sided = consistent_orientation(edges.pairs(), edges.forwards)
     if one_sided.any():

@@ -93,6 +93,17 @@ def step_error(
     return float(np.linalg.norm(shells - expected, axis=-1).max() / thickness)
 
 
+def outward_share(shells: NDArray[np.floating], triangles: NDArray[np.integer]) -> float:
+    """Share of the surface, as seen from all around the mesh without its fur, whose hair stands
+    towards the viewer; 1 of a body. shells (N, V, 3), the last one on the surface; (F, 3)."""
+    from pipelines.geometry.rays import seen_from_outside
+
+    surface = shells[-1].astype(np.float64)
+    hair = (shells[0].astype(np.float64) - surface)[triangles].sum(axis=1)
+    seen = seen_from_outside(surface, triangles, 1 << 14)
+    return float(np.mean(np.einsum("ni,ni->n", hair[seen.triangle], seen.direction) < 0))
+
+
 def top_view_rmse(
     picture: NDArray[np.uint8],
     radiance: NDArray[np.floating],
@@ -111,6 +122,8 @@ def top_view_rmse(
     return float(np.sqrt(np.mean((step / 255.0) ** 2)))
 
 
-def mean_brightness(pictures: NDArray[np.uint8]) -> float:
-    """Mean of the pictures' 8-bit codes, in [0, 1]."""
-    return float(pictures.mean(dtype=np.float64) / 255.0)
+def mean_brightness(pictures: NDArray[np.uint8], background: NDArray[np.uint8]) -> float:
+    """Mean of the pictures' 8-bit codes, in [0, 1], but for pixels of the background's codes (3,);
+    0 where there is nothing else."""
+    fur = pictures[(pictures != background).any(axis=-1)]
+    return float(fur.mean(dtype=np.float64) / 255.0) if len(fur) else 0.0

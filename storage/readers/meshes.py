@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.glb_files import read_glb
+from storage.readers.gltf import read_gltf
 from storage.readers.obj_files import read_obj
 from storage.readers.opening import first_bytes
 from storage.readers.ply_files import read_ply
@@ -19,7 +19,7 @@ from storage.readers.polygons import PolygonMesh, triangulate
 from storage.readers.stl_files import is_stl, read_stl
 from storage.readers.usable_polygons import usable_polygons
 
-FORMATS = "a PLY, OBJ, STL or GLB mesh"
+FORMATS = "a PLY, OBJ, STL or glTF mesh"
 
 # What other formats of meshes begin with; none of them is read.
 _OTHER_FORMATS = (
@@ -74,7 +74,7 @@ def read_polygons(file: Path) -> PolygonMesh:
     """The polygons of a file, as they are; raises BadInput as `read_mesh`, but for the mesh."""
     found = mesh_format(file)
     if found == "gltf":
-        return read_glb(file).mesh
+        return read_gltf(file).mesh
     if found == "obj":
         return read_obj(file).mesh
     return read_ply(file) if found == "ply" else read_stl(file)

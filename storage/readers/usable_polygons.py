@@ -114,7 +114,7 @@ def _with_distinct_corners(mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
 
 
 def _of_three_corners(file: Path, mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
-    small: NDArray[np.bool_] = mesh.sizes < 3
+    small = np.less(mesh.sizes, 3)
     if not small.any():
         return mesh
     if small.all():
@@ -127,7 +127,7 @@ def _of_three_corners(file: Path, mesh: PolygonMesh, notes: list[str]) -> Polygo
 
 
 def _finite(file: Path, mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
-    wrong = ~np.isfinite(mesh.positions).all(axis=1)[mesh.corners]
+    wrong = ~np.asarray(np.isfinite(mesh.positions).all(axis=1))[mesh.corners]
     if wrong.any():
         bad = np.zeros(len(mesh.sizes), bool)
         bad[_owners(mesh)[wrong]] = True
@@ -140,7 +140,7 @@ def _finite(file: Path, mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
         mesh = _with_polygons(mesh, ~bad)
     if mesh.corner_uvs is not None:
         missing = np.isnan(mesh.corner_uvs).all(axis=1)
-        wrong = ~np.isfinite(mesh.corner_uvs).all(axis=1)
+        wrong = ~np.asarray(np.isfinite(mesh.corner_uvs).all(axis=1))
         if unusable := int((wrong & ~missing).sum()):
             corners = counted(unusable, "corner")
             notes.append(f"Texture coordinates of {corners} left out: no finite numbers.")

@@ -35,7 +35,7 @@ def closed_shapes() -> dict[str, tuple[Array, Rows]]:
     pot, ball = glass_teapot(4), shapes.sphere(8)
     closed = {
         "cube": (CUBE, CUBE_TRIANGLES),
-        "sphere": make_closed_mesh(ball.vertices, ball.triangles),
+        "sphere": make_closed_mesh(ball.vertices, ball.triangles)[:2],
         "teapot": (pot.vertices, pot.triangles),
     }
     return {name: (np.array(v), np.array(f, np.int64)) for name, (v, f) in closed.items()}
@@ -306,7 +306,7 @@ def test_any_triangles(corners: list[tuple[int, int, int]], seed: int) -> None:
             closed &= 2 * sum(inside) == len(inside)
         if closed:
             assert volume(mesh.vertices, mesh.triangles[rows]) > 0
-        else:
+        elif not any("small openings" in note for note in mesh.notes):
             assert area[rows] @ np.where(same[rows], 1, -1) >= 0
     one_sided = sum(not orientable for _, orientable in pieces_by_search(mesh.triangles))
     assert any(f"{one_sided} piece" in note for note in mesh.notes) == (one_sided > 0)

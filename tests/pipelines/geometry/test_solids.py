@@ -42,7 +42,7 @@ def test_a_closed_mesh_is_kept() -> None:
 
 def test_a_mesh_inside_out_is_turned_and_keeps_its_order() -> None:
     mesh = make_closed_mesh(CUBE, INSIDE_OUT)
-    assert volume(*mesh) == pytest.approx(1)
+    assert volume(mesh.vertices, mesh.triangles) == pytest.approx(1)
     np.testing.assert_array_equal(mesh.vertices[mesh.triangles], CUBE[INSIDE_OUT[:, [0, 2, 1]]])
 
 
@@ -52,7 +52,7 @@ def test_triangles_that_disagree_are_turned() -> None:
         over = np.random.default_rng(seed).random(12) < 0.5
         mixed[over] = mixed[over][:, ::-1]
         mesh = make_closed_mesh(CUBE + 10, mixed)
-        assert volume(*mesh) == pytest.approx(1)
+        assert volume(mesh.vertices, mesh.triangles) == pytest.approx(1)
         assert_closed(make_solid(CUBE + 10, mixed))
 
 
@@ -64,13 +64,13 @@ def test_seams_are_welded_and_what_is_no_surface_is_dropped() -> None:
     mesh = make_closed_mesh(split, triangles)
     assert mesh.vertices.shape == (8, 3)
     assert mesh.triangles.shape == (12, 3)
-    assert volume(*mesh) == pytest.approx(1)
+    assert volume(mesh.vertices, mesh.triangles) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("turned", list(itertools.product((False, True), repeat=2)))
 def test_a_cavity_faces_into_the_cavity(turned: tuple[bool, bool]) -> None:
     mesh = make_closed_mesh(*cubes((0, 2), (0.5, 1), turned=turned))
-    assert volume(*mesh) == pytest.approx(4**3 - 2**3)
+    assert volume(mesh.vertices, mesh.triangles) == pytest.approx(4**3 - 2**3)
 
 
 def test_surfaces_face_by_turns_however_deep_they_lie() -> None:
@@ -79,7 +79,9 @@ def test_surfaces_face_by_turns_however_deep_they_lie() -> None:
     for seed in range(4):
         turned = tuple(bool(over) for over in np.random.default_rng(seed).random(5) < 0.5)
         mesh = make_closed_mesh(*cubes(*nested, turned=turned))
-        assert volume(*mesh) == pytest.approx(8**3 - 3**3 + 2**3 - 2**3 + 2**3)
+        assert volume(mesh.vertices, mesh.triangles) == pytest.approx(
+            8**3 - 3**3 + 2**3 - 2**3 + 2**3
+        )
 
 
 def test_a_surface_in_anothers_box_but_outside_is_no_cavity() -> None:
@@ -94,8 +96,52 @@ def test_a_surface_in_anothers_box_but_outside_is_no_cavity() -> None:
     both = make_closed_mesh(
         np.concatenate([ring.reshape(-1, 3), vertices]), np.concatenate([faces, cube + 625])
     )
-    assert volume(*both) == pytest.approx(volume(*hull) + 0.6**3)
-    assert volume(*hull) == pytest.approx(2 * np.pi**2 * 2 * 0.5**2, rel=0.04)
+    assert volume(*both[:2]) == pytest.approx(volume(*hull[:2]) + 0.6**3)
+    assert volume(*hull[:2]) == pytest.approx(2 * np.pi**2 * 2 * 0.5**2, rel=0.04)
+
+
+def split_cube(gap: float, extra: Rows) -> tuple[Array, Rows]:
+    """The cube, each triangle with corners of its own, apart by ``gap``, and further triangles."""
+    random = np.random.default_rng(0)
+    apart = CUBE[CUBE_TRIANGLES].reshape(-1, 3) + random.uniform(-gap, gap, (36, 3)) / 2
+    triangles = np.concatenate([np.arange(36).reshape(-1, 3), extra])
+    return apart, triangles
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-9, 5e-8])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
+def test_gaps_far_below_the_size_are_none(gap: float, size: float) -> None:
+    vertices, triangles = split_cube(gap, np.array([[0, 0, 1], [4, 4, 4]]))
+    mesh = make_closed_mesh(vertices * size, triangles)
+    assert volume(*mesh[:2]) == pytest.approx(size**3)
+    assert "2 triangles dropped: repeated corners or no area." in mesh.notes
+
+
+def test_gaps_that_are_seen_are_open() -> None:
+    with pytest.raises(ValueError, match="open along 36 border edges.*fill its holes"):
+        make_closed_mesh(*split_cube(1e-3, np.zeros((0, 3), np.int64)))
+
+
+def test_a_triangle_without_area_stays_where_it_closes_a_slit() -> None:
+    """A corner in the middle of the edge between two triangles, of which one does not have it."""
+    edge = CUBE_TRIANGLES[0, :2]
+    middle = CUBE[edge].mean(axis=0)
+    a, b = (int(end) for end in edge)
+    c = int(CUBE_TRIANGLES[0, 2])
+    triangles = np.concatenate(
+        [np.delete(CUBE_TRIANGLES, 0, axis=0), [[a, 8, c], [8, b, c], [a, b, 8]]]
+    )
+    mesh = make_closed_mesh(np.concatenate([CUBE, [middle]]), triangles)
+    assert len(mesh.triangles) == 14
+    assert volume(*mesh[:2]) == pytest.approx(1)
+
+
+def test_what_was_turned_over_is_told() -> None:
+    assert make_closed_mesh(CUBE, CUBE_TRIANGLES).notes == ()
+    turned = "12 triangles turned over to face out of the material."
+    assert make_closed_mesh(CUBE, INSIDE_OUT).notes == (turned,)
+    nested = cubes((0, 2), (0.5, 1), turned=(False, True))
+    assert make_closed_mesh(*nested).notes == ()  # a cavity faces inwards
 
 
 def test_open_meshes_are_refused() -> None:
@@ -129,14 +175,18 @@ def test_a_klein_bottle_is_refused() -> None:
         make_closed_mesh(vertices, faces)
 
 
+FLAT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+
+
 @pytest.mark.parametrize(
     ("vertices", "triangles", "reason"),
     [
         (CUBE, CUBE_TRIANGLES[:0], "no triangles"),
         (CUBE, [[0, 1, 8]], "vertices 0 to 8"),
-        (CUBE * 0, CUBE_TRIANGLES, "no triangle has three corners apart"),
-        (CUBE + 3, [[0, 1, 2], [0, 2, 1]], "1 of 1 surfaces enclose no volume"),
-        (CUBE, [[0, 1, 2], [0, 2, 1]], "1 of 1 surfaces enclose no volume"),
+        (CUBE * 0, CUBE_TRIANGLES, "no triangle has an area"),
+        (CUBE, [[0, 1, 2], [0, 2, 1]], "open along 3 border edges.*give a sheet some thickness"),
+        (FLAT, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], "1 of 1 surfaces enclose no volume"),
+        (FLAT + 3, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], "1 surfaces enclose no volume"),
     ],
 )
 def test_what_is_no_solid(vertices: Array, triangles: Rows, reason: str) -> None:

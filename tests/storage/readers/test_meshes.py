@@ -284,7 +284,7 @@ ACME: dict[str, Any] = {"extensionsRequired": ["ACME_geometry"]}
 REFUSED: list[tuple[str, str, Callable[[Path], Any]]] = [
     ("missing.obj", "file is missing", lambda path: None),
     ("folder.glb", "file is a directory", lambda path: path.mkdir()),
-    ("mesh.xyz", "format is unknown; expected a PLY, OBJ, STL or GLB mesh", text("0 0 0")),
+    ("mesh.xyz", "format is unknown; expected a PLY, OBJ, STL or glTF mesh", text("0 0 0")),
     ("fox.fbx", "format is FBX; expected a PLY, OBJ", text("Kaydara FBX Binary  \0\x1a\0")),
     ("cut.stl", "content is truncated or damaged: 1 vertex of 1 triangles", text(STL[:60])),
     ("cut.stl", "content is truncated: 0 of 1", packed(bytes(80) + b"\1\0\0\0" + bytes(40))),
