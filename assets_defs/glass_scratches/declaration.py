@@ -21,13 +21,9 @@ ENVIRONMENTS = ("lamps", "sky", "uniform")
 
 
 def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:
-    from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
-    from storage.readers.profiles import read_profile
+    from assets_defs.glass_scratches.profile_files import load_profile
 
-    if source.path is not None:
-        cut_profile(read_profile(source.path), source.name)
-    else:
-        built_in_profile(settings["shape"], settings["profile_width"], settings["profile_depth"])
+    load_profile(source, settings)
 
 
 def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
@@ -35,7 +31,7 @@ def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
     from storage.readers.meshes import read_mesh
 
     if source.path is not None:
-        vertices, triangles, _ = read_mesh(source.path)
+        vertices, triangles, *_ = read_mesh(source.path)
         try:
             make_closed_mesh(vertices, triangles)
         except ValueError as error:
@@ -83,7 +79,7 @@ SCRATCHES = System(
             builtin=SETTINGS,
             examples=("setting-2", "worn"),
             default="setting-2",
-            suffixes=(".csv",),
+            suffixes=(".csv", ".txt", ".tsv", ".dat", ".asc", ".prf", ".smd", ".sdf"),
             check=_check_profile,
         ),
         Dimension(
@@ -91,7 +87,7 @@ SCRATCHES = System(
             builtin=OBJECTS,
             examples=("plate",),
             default="plate",
-            suffixes=(".ply", ".obj", ".glb"),
+            suffixes=(".ply", ".obj", ".stl", ".glb", ".gltf"),
             check=_check_object,
         ),
     ),

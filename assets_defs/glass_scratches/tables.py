@@ -12,7 +12,7 @@ from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Pictures, Result
+from assets_defs.system import NOTES, Pictures, Result
 from storage.schemas import glass_scratches as schemas
 from storage.stored_version import StoredVersion
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class ProfileSettings(Settings):
-    """The built-in cross-section; a CSV of yours has its own."""
+    """The built-in cross-section; a file of yours has its own."""
 
     shape: Literal["v", "u", "trapezoid", "raised"] = Field(
         "v", description="Built-in profile; raised: with borders, cut at their crests"
@@ -34,6 +34,16 @@ class ProfileSettings(Settings):
     )
     profile_depth: float = Field(
         4.0, gt=0.0, allow_inf_nan=False, description="Depth below the surface, micrometres"
+    )
+    step: float | None = Field(
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="Your file of heights alone: distance of its points, micrometres",
+    )
+    level: bool = Field(
+        False,
+        description="Your scan: subtract the line through the land beside the scratch (its tilt)",
     )
 
     @classmethod
@@ -71,7 +81,7 @@ def _opening_tilt(version: StoredVersion) -> float:
             "aspect",
             "Depth over the opening's width.",
             _aspect,
-            at_least=0.005,
+            at_least=1e-3,
             at_most=20.0,
             change=0.01,
         ),
@@ -87,16 +97,16 @@ def scratch_profile(settings: ProfileSettings, source: Source) -> Result:
     """Read the cross-section, or take a built-in one, between its crests."""
     import xarray as xr
 
-    from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
-    from storage.readers.profiles import read_profile
+    from assets_defs.glass_scratches.profile_files import load_profile
 
-    if source.path is not None:
-        points = cut_profile(read_profile(source.path), source.name)
-    else:
-        points = built_in_profile(settings.shape, settings.profile_width, settings.profile_depth)
+    points, notes = load_profile(source, settings.model_dump())
     dataset = xr.Dataset({"points": (("point", "axis"), points)}, attrs={"name": source.name})
     width = float(points[-1, 0] - points[0, 0])
-    return dataset, {"opening, µm": width, "deepest, µm": float(-points[:, 1].min())}
+    return dataset, {
+        "opening, µm": width,
+        "deepest, µm": float(-points[:, 1].min()),
+        NOTES: notes,
+    }
 
 
 # ---- scratch_table_2d ------------------------------------------------------------------------

@@ -1,14 +1,12 @@
-"""Cross-sections of scratches: CSV files of points.
+"""Cross-sections of scratches: text files of points as profilers, microscopes and spreadsheets
+write them.
 
-Parsed here and not by numpy: the decimal commas of many a profilometer's export, the order of the
-header's columns and the line number of what is wrong all matter.
+Parsed here and not by numpy: units, decimal commas, the order of a header's columns and the line
+number of what is wrong all matter.
 """
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
@@ -17,187 +15,100 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.opening import LONGEST_NUMBER, check_file, unreadable
+from storage.readers.profile_columns import positions_and_heights
+from storage.readers.profile_records import record_of
+from storage.readers.profile_tables import table_of
+from storage.readers.profile_text import lines_of, text_of
 
 FEWEST_POINTS = 3
 MOST_POINTS = 100_000
 
-_LARGEST = 64 << 20  # bytes: 600 a point
-_LONGEST_LINE = 100_000
-_MOST_LINES = 5 * MOST_POINTS  # comments and blank lines among them
 
-_EXPECTED = "a CSV file of points v, n in UTF-8"
-_SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
-_COLUMN = re.compile(r"([vn])(?:[\s_/(\[]+([^\W\d_]+)\s*[)\]]?)?")
-# Casefolding turns the micro sign into the Greek letter mu.
-_MICROMETRES = frozenset(
-    ["um", "\u03bcm", "micron", "microns", "micrometre", "micrometres", "micrometer", "micrometers"]
-)
+class ProfileFile(NamedTuple):
+    """A scratch's cross-section as a file has it.
 
+    points: (n, 2) float64, v across and n up, micrometres, in the file's order. notes: sentences on
+    what was mended or left out. gaps: (g, 2) float64, the v on both sides of where points without a
+    height were dropped.
+    """
 
-class _Layout(NamedTuple):
-    """Cells in a line, and which of them are v and n."""
-
-    cells: int
-    v: int
-    n: int
+    points: NDArray[np.float64]
+    notes: tuple[str, ...]
+    gaps: NDArray[np.float64]
 
 
-def read_profile(path: str | PathLike[str]) -> NDArray[np.float64]:
+def read_profile(path: str | PathLike[str], step: float | None = None) -> ProfileFile:
     """Read a scratch's cross-section as a chain of points.
 
-    Parameters: ``path``, a text file in UTF-8 with one point a line: v (across the scratch) and n
-    (height), in micrometres, separated by commas, semicolons or tabs. Where the separator is no
-    comma, decimal commas are read too; a file uses commas or points, not both. A header may name
-    the columns, ``v`` and ``n`` in either order, with a unit if it is the micrometre (``v [um]``,
-    ``N_um``, ``v (µm)``); other columns are then passed over. Lines that begin with ``#`` are
-    comments, except that one before the points which names v and n is a header, as
-    ``numpy.savetxt`` writes it. Blank lines are passed over.
+    Parameters: ``path``, a text file (UTF-8, UTF-16, Windows' code page, Shift-JIS) with a point a
+    line: across the scratch, and height. Cells stand between tabs, semicolons, commas or spaces;
+    decimals have points or commas. A header, its lines commented out or not, may name the columns
+    (v and n, x and z, distance and height, lateral and profile …) in any order, and units in or
+    under the names or in what stands before; without any, two columns are v and n in micrometres.
+    A single column, or the metrology formats SMD, PRF, SDF and PR, are evenly spaced heights.
+    ``step``: the distance of a single column's points, micrometres; over what the file says.
 
-    Returns (points, 2) float64: v and n in micrometres, in the order of the file.
+    Points without a height are dropped, and those that repeat the one before.
 
-    Raises BadInput for a file that is missing, a directory, not text or empty; for a header that
-    does not name v and n or has another unit; naming the line, for a wrong number of columns, for
-    what is no finite number and for a point that repeats the one before; for fewer than 3 or more
-    than 100 000 points; and for points that all lie on one height. Whether the chain crosses
-    itself is not looked at.
+    Raises BadInput for a file that is missing, a directory, not text or empty; for columns, units
+    or distances that are not clear; naming the line, for what is no point or no finite number; for
+    fewer than 3 or more than 100 000 points; and for points that all lie on one height. Whether
+    the chain crosses itself is not looked at.
     """
     file = Path(path)
-    last = 0
-    points: list[tuple[float, float]] = []
-    for number, v, n in _rows(file):
-        if points and points[-1] == (v, n):
-            found = f"({v}, {n}), the same point as on line {last}"
-            raise BadInput(file, f"line {number}", found, "another point than the one before")
-        if len(points) == MOST_POINTS:
-            raise BadInput(
-                file, "number of points", f"more than {MOST_POINTS}", f"at most {MOST_POINTS}"
-            )
-        last = number
-        points.append((v, n))
+    text = text_of(file)
+    record = record_of(file, text)
+    notes: tuple[str, ...]
+    if record is not None:
+        if len(record.heights) > MOST_POINTS:
+            raise _too_many(file, len(record.heights))
+        v = np.arange(len(record.heights), dtype=np.float64) * record.step
+        n, notes = record.heights, record.notes
+    else:
+        table = table_of(file, lines_of(file, text))
+        if len(table.rows) > MOST_POINTS:
+            raise _too_many(file, len(table.rows))
+        v, n, notes = positions_and_heights(file, table, step)
+    if record is not None and step is not None:
+        notes += ("The setting step was not used: the file has its own.",)
+    return _checked(file, v, n, notes)
+
+
+def _checked(
+    file: Path, v: NDArray[np.float64], n: NDArray[np.float64], notes: tuple[str, ...]
+) -> ProfileFile:
+    measured = np.isfinite(v) & np.isfinite(n)
+    points = np.stack([v, n], axis=-1)[measured]
+    if not measured.all():
+        dropped = int(np.sum(~measured))
+        word = "point without a height was" if dropped == 1 else "points without a height were"
+        notes += (f"{dropped} {word} dropped.",)
     if len(points) < FEWEST_POINTS:
-        raise BadInput(file, "number of points", f"{len(points)}", f"at least {FEWEST_POINTS}")
-    profile = np.array(points, np.float64)
-    if (profile[:, 1] == profile[0, 1]).all():
-        raise BadInput(file, "height n", f"{profile[0, 1]} at every point", "a profile with relief")
-    return profile
+        without = f", {np.sum(~measured)} more without a height" * bool((~measured).any())
+        expected = f"at least {FEWEST_POINTS}, a line each"
+        raise BadInput(file, "number of points", f"{len(points)}{without}", expected)
+    at = np.flatnonzero(measured)
+    is_gap = np.diff(at) > 1
+    gaps = np.stack([v[at[:-1][is_gap]], v[at[1:][is_gap]]], axis=-1)
+    repeated = (np.diff(points, axis=0) == 0).all(axis=1)
+    if repeated.any():
+        count = int(repeated.sum())
+        word = "point that repeats" if count == 1 else "points that repeat"
+        notes += (f"{count} {word} the one before {'was' if count == 1 else 'were'} dropped.",)
+        points = points[np.concatenate([[True], ~repeated])]
+    if (points[:, 1] == points[0, 1]).all():
+        found = f"{points[0, 1]:g} µm at every point"
+        raise BadInput(file, "height", found, "a profile with relief")
+    if len(points) < FEWEST_POINTS:
+        raise BadInput(
+            file, "number of points", f"{len(points)} that differ", f"at least {FEWEST_POINTS}"
+        )
+    if not np.ptp(points[:, 0]) > 0:
+        found = f"{points[0, 0]:g} µm at every point"
+        raise BadInput(file, "position", found, "points beside each other")
+    return ProfileFile(points, notes, gaps)
 
 
-def _rows(file: Path) -> Iterator[tuple[int, float, float]]:
-    """Line number, v and n of each point."""
-    layout = _Layout(2, 0, 1)
-    separator = ""
-    decimal = ""  # the mark of the first number that has one
-    for number, line in _lines(file):
-        if line.lstrip().startswith("#"):
-            if not separator:
-                layout = _commented_header(file, line) or layout
-            continue
-        if not separator:
-            separator = next((mark for mark in _SEPARATORS if mark in line), ",")
-            cells = _cells(line, separator)
-            if not any(_is_number(cell.replace(",", ".")) for cell in cells):
-                layout = _header(file, number, line, cells)
-                continue
-        cells = _cells(line, separator)
-        if len(cells) != layout.cells:
-            raise BadInput(
-                file,
-                f"number of columns on line {number}",
-                f"{len(cells)}",
-                f"{layout.cells} with {_SEPARATORS[separator]} between them",
-            )
-        point = []
-        for name, cell in (("v", cells[layout.v]), ("n", cells[layout.n])):
-            mark = "," if "," in cell else "." if "." in cell else decimal
-            decimal = decimal or mark
-            if mark != decimal:
-                raise BadInput(
-                    file,
-                    f"{name} on line {number}",
-                    f"'{cell[:60]}'",
-                    f"a number with a '{decimal}' before its decimals, as on the lines before",
-                )
-            point.append(_finite(file, number, name, cell))
-        yield number, point[0], point[1]
-
-
-def _lines(file: Path) -> Iterator[tuple[int, str]]:
-    """The lines that are not blank, with their numbers from 1; a byte order mark is left out."""
-    check_file(file, _EXPECTED, _LARGEST)
-    empty = True
-    try:
-        with file.open(encoding="utf-8-sig") as stream:
-            for number, line in enumerate(stream, start=1):
-                if number > _MOST_LINES:
-                    expected = f"at most {_MOST_LINES}"
-                    raise BadInput(file, "number of lines", f"more than {_MOST_LINES}", expected)
-                if len(line) > _LONGEST_LINE:
-                    found, expected = f"{len(line)} characters", f"at most {_LONGEST_LINE}"
-                    raise BadInput(file, f"length of line {number}", found, expected)
-                if "\0" in line:  # valid UTF-8, but the mark of a binary file or of UTF-16
-                    raise BadInput(file, "content", "not text", _EXPECTED)
-                if line.strip():
-                    empty = False
-                    yield number, line
-    except UnicodeDecodeError:
-        raise BadInput(file, "content", "not UTF-8 text", _EXPECTED) from None
-    except OSError as error:
-        raise unreadable(file, error, _EXPECTED) from error
-    if empty:
-        raise BadInput(file, "content", "empty", _EXPECTED)
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    return [cell.strip().strip('"').strip() for cell in line.split(separator)]
-
-
-def _header(file: Path, number: int, line: str, cells: list[str]) -> _Layout:
-    layout = _named(file, cells)
-    if layout is None:
-        found = f"'{line.strip()[:60]}'"
-        raise BadInput(file, f"header on line {number}", found, "one column v and one column n")
-    return layout
-
-
-def _commented_header(file: Path, line: str) -> _Layout | None:
-    """The layout that a comment gives: v and n swapped by ``# n, v`` would go unseen."""
-    return _named(file, _cells(re.sub(r"[;\t]", ",", line.strip().lstrip("#")), ","))
-
-
-def _named(file: Path, cells: list[str]) -> _Layout | None:
-    """The layout by the names in a header's cells; None unless v and n are there, once each."""
-    columns: dict[str, list[int]] = {"v": [], "n": []}
-    units: dict[str, str] = {}
-    for at, cell in enumerate(cells):
-        match = _COLUMN.fullmatch(cell.casefold())
-        if match:
-            columns[match[1]].append(at)
-            units[match[1]] = match[2] or "um"
-    if len(columns["v"]) != 1 or len(columns["n"]) != 1:
-        return None
-    for name, unit in units.items():
-        if unit not in _MICROMETRES:
-            raise BadInput(file, f"unit of {name} in the header", f"'{unit[:60]}'", "um")
-    return _Layout(len(cells), columns["v"][0], columns["n"][0])
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word[:LONGEST_NUMBER])
-    except ValueError:
-        return False
-    return (
-        len(word) <= LONGEST_NUMBER and "_" not in word
-    )  # 1_000 is Python's way to write a thousand, nobody else's
-
-
-def _finite(file: Path, number: int, name: str, cell: str) -> float:
-    word = cell.replace(",", ".")
-    field = f"{name} on line {number}"
-    if not _is_number(word):
-        raise BadInput(file, field, f"'{cell[:60]}'", "a number")
-    value = float(word)
-    if not math.isfinite(value):
-        raise BadInput(file, field, f"'{cell[:60]}'", "a finite number")
-    return value
+def _too_many(file: Path, count: int) -> BadInput:
+    expected = f"at most {MOST_POINTS}: export the surroundings of the scratch alone"
+    return BadInput(file, "number of points", f"{count}", expected)

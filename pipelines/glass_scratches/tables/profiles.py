@@ -67,7 +67,7 @@ def cut_profile(points: ArrayLike, name: str) -> NDArray[np.float64]:
     """The part of a cross-section (P, 2) between the crests beside its deepest point.
 
     Both sides are cut at the height of the lower crest; the opening's middle becomes v = 0 and its
-    height n = 0. Overhangs inside are allowed.
+    height n = 0. Overhangs inside are allowed. A profile that runs from right to left is turned.
 
     Raises ValueError, with ``name`` in it, for what is no scratch: fewer than three points, values
     that are not finite, no point deeper than its ends, ends that run back under themselves, a
@@ -82,13 +82,15 @@ def cut_profile(points: ArrayLike, name: str) -> NDArray[np.float64]:
             f"{name}: profile has the shape {given.shape}; expected at least three finite points "
             "(v, n)."
         )
+    if given[-1, 0] < given[0, 0]:
+        given = given[::-1]
     deepest = int(np.argmin(given[:, 1]))
     left, right = given[: deepest + 1], given[deepest:]
     level = min(left[:, 1].max(), right[:, 1].max())
     if not level > given[deepest, 1]:
         raise ValueError(
             f"{name}: the deepest point is at an end of the profile; expected higher points on "
-            "both sides of it."
+            "both sides of it, or the setting level for a tilted scan."
         )
     kept = np.concatenate([_up_to(left[::-1], level)[:0:-1], _up_to(right, level)])
     middle = (kept[0, 0] + kept[-1, 0]) / 2
@@ -100,7 +102,9 @@ def cut_profile(points: ArrayLike, name: str) -> NDArray[np.float64]:
                 f"{name}: the profile runs back under its {end} end; expected one height for each "
                 "v there."
             )
-    crossing = _first_crossing(np.vstack([cut, cut[:1]]))
+    crossing = None
+    if not (np.diff(cut[:, 0]) > 0).all():  # the graph of a function does not cross itself
+        crossing = _first_crossing(np.vstack([cut, cut[:1]]))
     if crossing is not None:
         one, other = crossing
         raise ValueError(
