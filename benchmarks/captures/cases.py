@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from benchmarks.captures import light_probes
 from benchmarks.captures.case import Case
 
-CASES: dict[str, tuple[Case, ...]] = {}
+CASES: dict[str, tuple[Case, ...]] = {
+    "light_probes": light_probes.CASES,
+}

@@ -131,11 +131,10 @@ def _check_size(file: Path, width: int, height: int, cube: bool) -> None:
     if cube:
         if height != 6 * width:
             raise BadInput(file, "size of a cube's faces", found, "a height of six widths")
-    elif not is_cross(width, height) and abs(width - 2 * height) > _NEARLY * 2 * height:
-        raise BadInput(
-            file, "size", found, f"a width of twice the height{_other_way(width, height)}"
-        )
-    if max(width, height) < SMALLEST_WIDTH:
+    elif not is_cross(width, height) and abs(width - 2 * height) > max(1, _NEARLY * 2 * height):
+        other = _other_way(width, height)
+        raise BadInput(file, "size", found, f"a width of twice the height{other}")
+    if (4 * width if cube else max(width, height)) < SMALLEST_WIDTH:
         raise BadInput(file, "size", found, f"a width of at least {SMALLEST_WIDTH} pixels")
 
 
