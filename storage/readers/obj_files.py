@@ -154,6 +154,9 @@ class _Content:
         notes = []
         if self.others:
             things = " and ".join(counted(n, thing) for thing, n in self.others.items())
+            if not self.sizes:
+                expected = "faces: convert curves and surfaces to polygons where they were made"
+                raise BadInput(file, "content", f"{things} without faces", expected)
             notes.append(f"{things} not read: only polygons are.")
         if self.commas:
             notes.append(f"Decimal commas of {counted(self.commas, 'line')} read as points.")

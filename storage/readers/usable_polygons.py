@@ -108,9 +108,13 @@ def _with_distinct_corners(mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
             if len(outline) % again == 0 and (outline[again:] == outline[:-again]).all():
                 kept[its][again:] = False
                 break
-    if left_out := int((~kept).sum()):
-        notes.append(f"{counted(left_out, 'repeated corner')} of faces left out.")
-    return _with_corners(mesh, kept) if left_out else mesh
+    if kept.all():
+        return mesh
+    mended = _with_corners(mesh, kept)
+    left_out = (mesh.sizes - mended.sizes)[mended.sizes >= 3].sum()
+    if left_out:
+        notes.append(f"{counted(int(left_out), 'repeated corner')} of faces left out.")
+    return mended
 
 
 def _of_three_corners(file: Path, mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
