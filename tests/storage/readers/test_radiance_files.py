@@ -79,13 +79,9 @@ def test_headers_that_other_programs_write() -> None:
 @pytest.mark.parametrize(
     ("lines", "reason"),
     [
-        (["FORMAT=32-bit_rle_xyze"], "FORMAT is 32-bit_rle_xyze; expected 32-bit_rle_rgbe"),
-        (["EXPOSURE=0"], "EXPOSURE is '0'; expected a positive number"),
-        (["EXPOSURE=bright"], "EXPOSURE is 'bright'"),
-        (["EXPOSURE=1 2"], "EXPOSURE is '1 2'"),
-        (["COLORCORR=1 2 -3"], "COLORCORR is '1 2 -3'; expected 3 positive numbers"),
-        (["PRIMARIES=0.7 0.3 0 1 0 0 0.3 0.3"], "PRIMARIES is '0.7"),
-        (["PRIMARIES=sRGB"], "PRIMARIES is 'sRGB'; expected those of sRGB"),
+        (["FORMAT=32-bit_float"], "FORMAT is 32-bit_float; expected 32-bit_rle_rgbe or 32-bit"),
+        (["PRIMARIES=0.3 0.3 0 1"], "PRIMARIES is '0.3 0.3 0 1'; expected red, green, blue and"),
+        (["PRIMARIES=of the camera"], "PRIMARIES is 'of the camera'; expected red, green, blue"),
     ],
 )
 def test_header_lines_that_cannot_be_followed(lines: list[str], reason: str) -> None:
@@ -95,19 +91,68 @@ def test_header_lines_that_cannot_be_followed(lines: list[str], reason: str) -> 
 
 
 @pytest.mark.parametrize(
-    "line", ["-Y 9", "-Y 9 +X", "Y 9 X 14", "-X 9 +X 14", "-Y 9 +X 14 +Z 3", "-Y 12345678 +X 1", ""]
+    "line", ["EXPOSURE=0", "EXPOSURE=bright", "EXPOSURE=1 2", "COLORCORR=1 2 -3", "EXPOSURE=nan"]
+)
+def test_exposures_that_are_none_are_told(line: str) -> None:
+    rgbe = picture(9, 14)
+    data = hdr_bytes(rgbe, lines=[RGBE, line])
+    key, _, value = line.partition("=")
+    assert radiance_header(FILE, data).notes == (
+        f"{key}={value!r} is nothing to divide by: left out.",
+    )
+    np.testing.assert_allclose(radiance_pixels(FILE, data), light_of_rgbe(rgbe), rtol=1e-7)
+
+
+def test_a_space_by_its_name_and_xyz() -> None:
+    rgbe = picture(9, 14)
+    data = hdr_bytes(rgbe, lines=[RGBE, "PRIMARIES=sRGB"])
+    assert radiance_header(FILE, data).notes == ()
+    data = hdr_bytes(rgbe, lines=["FORMAT=32-bit_rle_xyze"])
+    assert "CIE XYZ" in radiance_header(FILE, data).notes[0]
+    light = light_of_rgbe(rgbe)
+    red = light @ np.array([3.2409699, -1.5373832, -0.4986108])
+    np.testing.assert_allclose(radiance_pixels(FILE, data)[..., 0], red, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "line", ["-Y 9", "-Y 9 +X", "Y 9 X 14", "-X 9 +X 14", "-Y 9 +X 14 +Z 3", "-Y 12345678 +X 1"]
 )
 def test_resolution_lines_that_say_nothing(line: str) -> None:
     with pytest.raises(BadInput, match=r"resolution line is '.*'; expected one like -Y 256"):
         radiance_header(FILE, f"#?RADIANCE\n\n{line}\n".encode())
 
 
-def test_truncated_pictures_and_the_code_before_1991() -> None:
+def test_truncated_pictures() -> None:
     for runs in (False, True):
         data = hdr_bytes(picture(9, 14), runs=runs)
         for end in (5, 30, len(data) // 2, len(data) - 1):
             with pytest.raises(BadInput, match=r"content is .*; expected .*"):
                 radiance_pixels(FILE, data[:end])
-    old = b"#?RADIANCE\n\n-Y 9 +X 14\n" + bytes([5, 6, 7, 128, 1, 1, 1, 125])
-    with pytest.raises(BadInput, match="8 bytes of pixels; expected 504 bytes, or scanlines"):
-        radiance_pixels(FILE, old)
+
+
+def test_the_code_before_1991() -> None:
+    """A pixel, 125 of it, and 256 and one more; the next line begins with another."""
+    size = b"#?RADIANCE\n\n-Y 2 +X 384\n"
+    one, other = [128, 64, 32, 129], [32, 64, 128, 129]
+    line = bytes([*one, 1, 1, 1, 125, *other, *other, 1, 1, 1, 255, *one])
+    more = bytes([*one, 1, 1, 1, 127, 1, 1, 1, 1])
+    light = radiance_pixels(FILE, size + line + more)
+    assert light[0, 125].tolist() == [1, 0.5, 0.25]
+    assert light[0, 126].tolist() == [0.25, 0.5, 1]
+    assert light[0, 383].tolist() == [1, 0.5, 0.25]
+    np.testing.assert_array_equal(light[1], np.broadcast_to([1, 0.5, 0.25], (384, 3)))
+
+
+@pytest.mark.parametrize(
+    "pixels",
+    [
+        [1, 1, 1, 3],  # nothing to repeat
+        [9, 9, 9, 129, 1, 1, 1, 16],  # beyond the line's end
+        [9, 9, 9, 129] + [1, 1, 1, 0] * 5,  # more than four bytes of a count
+        [2, 2, 0, 16, 150, 7],  # a run beyond the end
+        [2, 2, 0, 16, 17, *range(17)],  # a literal beyond the end
+    ],
+)
+def test_run_lengths_that_are_wrong(pixels: list[int]) -> None:
+    with pytest.raises(BadInput, match="content is truncated or damaged"):
+        radiance_pixels(FILE, b"#?RADIANCE\n\n-Y 1 +X 16\n" + bytes(pixels + [0] * 200))
