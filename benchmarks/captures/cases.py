@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from benchmarks.captures import light_probes
+from benchmarks.captures import light_probes, photographs
 from benchmarks.captures.case import Case
 
 CASES: dict[str, tuple[Case, ...]] = {
     "light_probes": light_probes.CASES,
+    "photographs": photographs.CASES,
 }

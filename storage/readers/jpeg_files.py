@@ -9,7 +9,7 @@ from typing import Any
 
 from storage.readers.bad_input import BadInput
 from storage.readers.decoded_image import StoredPicture
-from storage.readers.pillow_pictures import load, stored_picture
+from storage.readers.pillow_pictures import load, opened, stored_picture
 
 _MANY_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
 _MOST_SCANNED = 1_000_000_000  # pixels, which take some seconds
@@ -33,7 +33,7 @@ def read_jpeg(file: Path) -> StoredPicture:
 
     data = file.read_bytes()
     _check_frame(file, data)
-    size = JpegImagePlugin.JpegImageFile(io.BytesIO(data)).size
+    size = opened(JpegImagePlugin.JpegImageFile, io.BytesIO(data)).size
     scans = data.count(b"\xff\xda")  # and some by chance, in a film behind the photograph
     if scans > _MANY_SCANS and scans * math.prod(size) > _MOST_SCANNED:
         raise BadInput(file, "number of scans", f"{scans}", f"at most {_MANY_SCANS}; save it again")

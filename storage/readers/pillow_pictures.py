@@ -6,8 +6,9 @@ can only be changed for the whole process.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,17 @@ def load(
 ) -> ImageFile.ImageFile:
     """Open and decode; ``pixel_bytes``: of a pixel with all its channels. Raises BadInput for what
     is too large, and nearly anything for what is damaged."""
-    image = plugin(stream)
+    image = opened(plugin, stream)
     check_area(file, *image.size, pixel_bytes)
     image.load()
     return image
+
+
+def opened(plugin: type[ImageFile.ImageFile], stream: Any) -> ImageFile.ImageFile:
+    """A picture of which the header was read; Pillow warns of tags that nothing needs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return plugin(stream)
 
 
 def stored_picture(image: Image.Image, *, notes: tuple[str, ...] = ()) -> StoredPicture:
@@ -60,9 +68,23 @@ def as_alpha(codes: NDArray[Any]) -> NDArray[np.float32]:
 def orientation_of(image: Image.Image) -> tuple[object, tuple[str, ...]]:
     """EXIF's orientation, and what is to be said where the block cannot be read."""
     try:
-        return image.getexif().get(_ORIENTATION, 1), ()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            orientation = image.getexif().get(_ORIENTATION)
     except Exception:  # SyntaxError, struct.error and others by what is broken
         return 1, (_EXIF_DAMAGED,)
+    if orientation is None and not _is_whole(image.info.get("exif", b"")):
+        return 1, (_EXIF_DAMAGED,)
+    return orientation, ()
+
+
+def _is_whole(block: bytes) -> bool:
+    """Whether the tags of the picture itself lie inside the block; Pillow only warns."""
+    tags = block.removeprefix(b"Exif\0\0")
+    order: Literal["little", "big"] = "little" if tags[:2] == b"II" else "big"
+    at = int.from_bytes(tags[4:8], order)
+    count = int.from_bytes(tags[at : at + 2], order)
+    return not tags or at + 2 + 12 * count <= len(tags)
 
 
 def animation_notes(image: Image.Image) -> tuple[str, ...]:

@@ -1,0 +1,347 @@
+"""Photographs in PNG and JPEG: cut-outs, palettes, codings, and what phones add."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.captures.case import Case, Ending
+from benchmarks.captures.photograph_files import (
+    HEIGHT,
+    WIDTH,
+    Right,
+    Writer,
+    exif,
+    is_light,
+    light_of,
+    noise,
+    save_png,
+    slope,
+    stored_as,
+)
+from storage.readers.photographs import read_photograph
+
+_PLAIN, _DEEP, _GREY, _SLOPE = noise(), noise(np.uint16), noise(channels=1), slope()
+_LOSSY = 0.03
+_CUT_OUT = "a cut-out by alpha"
+_ANIMATION = "an animation: its first picture"
+_PHONE = "what phones add to a JPEG"
+
+
+def _case(
+    name: str,
+    kind: str,
+    right: Right | None,
+    write: Writer,
+    *says: str,
+    ends: Ending | None = None,
+) -> Case:
+    ending: Ending = ends or ("told" if says else "read")
+    return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
+
+
+# ---- PNG ---------------------------------------------------------------------------------------
+
+_alpha = np.zeros((HEIGHT, WIDTH), np.uint8)
+_alpha[10:, 5:40] = 255
+_opaque = _alpha > 127
+_soft = np.where(_opaque, 200, 90).astype(np.uint8)
+_HOLES = ("transparent and were left out",)
+
+
+def _keyed(codes: NDArray[Any]) -> tuple[NDArray[np.bool_], tuple[bytes, bytes]]:
+    """Where a colour is not that of the pixel at 3, 3, and the chunk that names it."""
+    key = codes[3, 3]
+    return (codes != key).any(axis=2), (b"tRNS", key.astype(">u2").tobytes())
+
+
+_grey_key, _deep_key = _keyed(_GREY), _keyed(_DEEP)
+_numbers = noise(channels=1, bits=4)
+_colours = np.random.default_rng(4).integers(0, 256, (16, 3)).astype(np.uint8)
+_plte = (b"PLTE", _colours.tobytes())
+_PNGS = (
+    _case(
+        "cutout_16.png",
+        _CUT_OUT,
+        is_light(light_of(_DEEP), opaque=_opaque),
+        save_png(np.dstack([_DEEP, _alpha.astype(np.uint16) * 257]), 6),
+        *_HOLES,
+    ),
+    _case(
+        "cutout_grey.png",
+        _CUT_OUT,
+        is_light(light_of(_GREY), opaque=_opaque),
+        save_png(np.dstack([_GREY, _alpha]), 4),
+        *_HOLES,
+    ),
+    _case(
+        "cutout_soft.png",
+        "partly transparent pixels",
+        is_light(light_of(_PLAIN), opaque=_opaque),
+        save_png(np.dstack([_PLAIN, _soft]), 6),
+        *_HOLES,
+        "100 % of the pixels are partly transparent",
+    ),
+    _case(
+        "nearly_opaque.png",
+        "partly transparent pixels",
+        is_light(light_of(_PLAIN)),
+        save_png(np.dstack([_PLAIN, np.maximum(_soft, 250)]), 6),
+        "partly transparent",
+    ),
+    _case(
+        "all_transparent.png",
+        "a picture that is all transparent",
+        None,
+        save_png(np.dstack([_PLAIN, _alpha // 255]), 6),
+        "transparent in 100 % of the pixels",
+        "save it without its alpha",
+        ends="refused",
+    ),
+    _case(
+        "opaque_alpha.png",
+        "alpha that is opaque",
+        is_light(light_of(_DEEP)),
+        save_png(np.dstack([_DEEP, np.full_like(_DEEP[..., 0], 65535)]), 6),
+    ),
+    _case(
+        "key_grey.png",
+        "a colour that stands for holes",
+        is_light(light_of(_GREY), opaque=_grey_key[0]),
+        save_png(_GREY, 0, _grey_key[1]),
+        *_HOLES,
+    ),
+    _case(
+        "key_16.png",
+        "a colour that stands for holes",
+        is_light(light_of(_DEEP), opaque=_deep_key[0]),
+        save_png(_DEEP, 2, _deep_key[1]),
+        "less than 0.1 % of the pixels are transparent",
+    ),
+    _case(
+        "palette.png",
+        "palettes",
+        is_light(light_of(_colours[_numbers[..., 0]])),
+        save_png(_numbers, 3, _plte, bits=4),
+    ),
+    _case(
+        "palette_holes.png",
+        "palettes",
+        is_light(light_of(_colours[_numbers[..., 0]]), opaque=_numbers[..., 0] != 2),
+        save_png(_numbers, 3, _plte, (b"tRNS", b"\xff\xff\0"), bits=4),
+        *_HOLES,
+    ),
+    *(
+        _case(
+            f"grey_{bits}.png",
+            "PNG: less than 8 bits",
+            is_light(light_of(noise(channels=1, bits=bits), (1 << bits) - 1), 3e-3),
+            save_png(noise(channels=1, bits=bits), 0, bits=bits),
+        )
+        for bits in (1, 2, 4)
+    ),
+    _case(
+        "significant_bits.png",
+        "PNG: significant bits",
+        is_light(light_of(_DEEP)),
+        save_png(_DEEP, 2, (b"sBIT", b"\x0a\x0a\x0a")),
+    ),
+    _case(
+        "animated.png",
+        _ANIMATION,
+        is_light(light_of(_PLAIN)),
+        lambda path: _save_frames(path),
+        "animation",
+    ),
+    *(
+        _case(
+            f"turned_{orientation}.png",
+            "turned upright: PNG",
+            is_light(light_of(codes)),
+            save_png(stored_as(codes, orientation), 2, (b"eXIf", exif(orientation))),
+        )
+        for orientation, codes in ((3, _DEEP), (8, _PLAIN))
+    ),
+    _case(
+        "turned_cutout.png",
+        "turned upright: PNG",
+        is_light(light_of(_PLAIN), opaque=_opaque),
+        save_png(stored_as(np.dstack([_PLAIN, _alpha]), 6), 6, (b"eXIf", exif(6))),
+        *_HOLES,
+    ),
+)
+
+
+def _save_frames(path: Path, **options: Any) -> None:
+    from PIL import Image
+
+    frames = [Image.fromarray(codes) for codes in (_PLAIN, 255 - _PLAIN, _PLAIN // 2)]
+    frames[0].save(path, save_all=True, append_images=frames[1:], **options)
+
+
+# ---- JPEG --------------------------------------------------------------------------------------
+
+
+def _jpeg(codes: NDArray[Any] = _SLOPE, mode: str | None = None, **options: Any) -> bytes:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    flat = codes[..., 0] if codes.shape[2] == 1 else codes
+    Image.fromarray(flat, mode).save(stream, "JPEG", **{"quality": 97, "subsampling": 0} | options)
+    return stream.getvalue()
+
+
+def _with_segment(marker: int, content: bytes, behind: bytes = b"") -> Writer:
+    """A segment behind the first two bytes, and bytes behind the picture."""
+
+    def write(path: Path) -> None:
+        data = _jpeg()
+        head = struct.pack(">BBH", 0xFF, marker, len(content) + 2) + content
+        path.write_bytes(data[:2] + head + data[2:] + behind)
+
+    return write
+
+
+def _xmp(text: str) -> bytes:
+    return b"http://ns.adobe.com/xap/1.0/\0" + text.encode()
+
+
+def _mpf(kinds: Sequence[int]) -> bytes:
+    """An index of pictures (CIPA DC-007) of these types, the first being the picture itself."""
+    entries = b"".join(
+        struct.pack(">IIIHH", kind, 100, 0 if number == 0 else 5000, 0, 0)
+        for number, kind in enumerate(kinds)
+    )
+    fields = struct.pack(">HHI4s", 0xB000, 7, 4, b"0100")
+    fields += struct.pack(">HHII", 0xB001, 4, 1, len(kinds))
+    fields += struct.pack(">HHII", 0xB002, 7, len(entries), 8 + 2 + 36 + 4)
+    return b"MPF\0MM\0*" + struct.pack(">IH", 8, 3) + fields + bytes(4) + entries
+
+
+_SMOOTH = is_light(light_of(_SLOPE), _LOSSY)
+_JPEGS = (
+    _case(
+        "progressive.jpg",
+        "JPEG: codings",
+        _SMOOTH,
+        lambda path: path.write_bytes(_jpeg(progressive=True)),
+    ),
+    _case(
+        "grey.jpg",
+        "JPEG: codings",
+        is_light(light_of(_SLOPE[..., 1:2]), _LOSSY),
+        lambda path: path.write_bytes(_jpeg(_SLOPE[..., 1:2])),
+    ),
+    _case(
+        "rgb.jpg",
+        "JPEG: codings",
+        _SMOOTH,
+        lambda path: path.write_bytes(_jpeg(keep_rgb=True)),
+    ),
+    _case(
+        "bits_12.jpg",
+        "JPEG: 12 bits, lossless",
+        None,
+        lambda path: _save_jpeg12(path),
+        "12 bit",
+        "16-bit TIFF",
+        ends="refused",
+    ),
+    _case(
+        "lossless.jpg",
+        "JPEG: 12 bits, lossless",
+        None,
+        lambda path: _save_lossless(path),
+        "lossless",
+        "a usual JPEG",
+        ends="refused",
+    ),
+    *(
+        _case(
+            f"turned_{orientation}.jpg",
+            "turned upright: JPEG",
+            _SMOOTH,
+            lambda path, orientation=orientation: path.write_bytes(  # type: ignore[misc]
+                _jpeg(stored_as(_SLOPE, orientation), exif=b"Exif\0\0" + exif(orientation))
+            ),
+        )
+        for orientation in (3, 6, 8)
+    ),
+    _case(
+        "turned_by_xmp.jpg",
+        "turned upright: JPEG",
+        is_light(light_of(stored_as(_SLOPE, 3)), _LOSSY),
+        _with_segment(0xE1, _xmp('<x tiff:Orientation="3"/>')),
+    ),
+    _case(
+        "exif_damaged.jpg",
+        "a damaged EXIF block",
+        _SMOOTH,
+        _with_segment(0xE1, b"Exif\0\0II*\0\xff\xff\xff\x7f"),
+        "EXIF block is damaged",
+    ),
+    _case(
+        "gain_map.jpg",
+        _PHONE,
+        _SMOOTH,
+        _with_segment(0xE1, _xmp('<x hdrgm:Version="1.0"/>'), _jpeg(_SLOPE[..., :1])),
+        "gain map",
+    ),
+    _case(
+        "depth_map.jpg",
+        _PHONE,
+        _SMOOTH,
+        _with_segment(0xE1, _xmp('<x GDepth:Format="RangeInverse" GDepth:Near="1"/>')),
+        "depth map",
+    ),
+    _case(
+        "motion.jpg",
+        _PHONE,
+        _SMOOTH,
+        _with_segment(0xE1, _xmp('<x GCamera:MotionPhoto="1"/>'), b"\0\0\0\x18ftypmp42"),
+        "film",
+    ),
+    _case(
+        "second_view.jpg",
+        _PHONE,
+        _SMOOTH,
+        _with_segment(0xE2, _mpf([0x030000, 0x020002]), _jpeg()),
+        "1 more picture",
+    ),
+    _case(
+        "large_preview.jpg",
+        "previews inside a JPEG",
+        _SMOOTH,
+        _with_segment(0xE2, _mpf([0x030000, 0x010002]), _jpeg()),
+    ),
+    _case(
+        "truncated.jpg",
+        "a truncated file",
+        None,
+        lambda path: path.write_bytes(_jpeg()[:-700]),
+        "truncated or damaged",
+        "copy or save it again",
+        ends="refused",
+    ),
+)
+
+
+def _save_jpeg12(path: Path) -> None:
+    import imagecodecs
+
+    path.write_bytes(imagecodecs.jpeg8_encode(_DEEP >> 4, bitspersample=12))
+
+
+def _save_lossless(path: Path) -> None:
+    import imagecodecs
+
+    path.write_bytes(imagecodecs.jpeg8_encode(_GREY[..., 0], lossless=True))
+
+
+CASES = (*_PNGS, *_JPEGS)
