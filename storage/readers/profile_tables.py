@@ -12,6 +12,8 @@ from storage.readers.bad_input import BadInput
 from storage.readers.profile_cells import SEPARATORS, cells_of, is_missing, number_of
 from storage.readers.profile_units import Column, column_of, micrometres
 
+MOST_POINTS = 100_000
+
 Line = tuple[int, str]
 _Kind = Literal["row", "empty", "text"]
 
@@ -42,21 +44,31 @@ class Table(NamedTuple):
     further: list[tuple[int, list[str]]]
 
 
+def too_many(file: Path, count: int) -> BadInput:
+    """What to raise for more points than are taken."""
+    expected = f"at most {MOST_POINTS}: export the surroundings of the scratch alone"
+    return BadInput(file, "number of points", f"{count}", expected)
+
+
 def table_of(file: Path, lines: Sequence[Line]) -> Table:
     """The first table of points among a file's lines.
 
-    Raises BadInput where there is none, where a header names other columns, and where a line in
-    the middle is no point.
+    Raises BadInput where there is none, or one of too many points, where a header names other
+    columns, and where a line in the middle is no point.
     """
     plain = [line for line in lines if not _COMMENT.match(line[1])]
+    if len(plain) > MOST_POINTS + _PREAMBLE_LINES:  # at once; it takes a second to look at them
+        raise too_many(file, len(plain))
     separator = _separator(plain)
     split = [(number, split_cells(text, separator)) for number, text in plain]
     kinds = [_kind(cells) for _, cells in split]
     first = _first_row(kinds)
     if first is None:
-        raise BadInput(file, "number of points", "0", "at least 3, a line each")
+        raise BadInput(file, "number of points", "0", "at least 3 that differ, a line each")
     last = next((at for at in range(first, len(kinds)) if kinds[at] == "text"), len(kinds))
     rows = split[first:last]
+    if len(rows) > MOST_POINTS:
+        raise too_many(file, len(rows))
     count = Counter(len(cells) for _, cells in rows[:100]).most_common(1)[0][0]
     for at in {first - 1, last} & set(range(len(kinds))):
         if _is_broken(split[at][1], count):

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.profile_columns import positions_and_heights
 from storage.readers.profile_records import record_of
-from storage.readers.profile_tables import table_of
+from storage.readers.profile_tables import MOST_POINTS, table_of, too_many
 from storage.readers.profile_text import lines_of, text_of
 
+__all__ = ["FEWEST_POINTS", "MOST_POINTS", "ProfileFile", "read_profile"]
+
 FEWEST_POINTS = 3
-MOST_POINTS = 100_000
 
 
 class ProfileFile(NamedTuple):
@@ -58,57 +59,47 @@ def read_profile(path: str | PathLike[str], step: float | None = None) -> Profil
     file = Path(path)
     text = text_of(file)
     record = record_of(file, text)
-    notes: tuple[str, ...]
-    if record is not None:
-        if len(record.heights) > MOST_POINTS:
-            raise _too_many(file, len(record.heights))
-        v = np.arange(len(record.heights), dtype=np.float64) * record.step
-        n, notes = record.heights, record.notes
-    else:
+    if record is None:
         table = table_of(file, lines_of(file, text))
-        if len(table.rows) > MOST_POINTS:
-            raise _too_many(file, len(table.rows))
-        v, n, notes = positions_and_heights(file, table, step)
-    if record is not None and step is not None:
-        notes += ("The setting step was not used: the file has its own.",)
-    return _checked(file, v, n, notes)
+        return _checked(file, *positions_and_heights(file, table, step))
+    count = len(record.heights)
+    if count > MOST_POINTS:
+        raise too_many(file, count)
+    unused = ("The setting step was not used: the file has its own.",)
+    notes = record.notes + (() if step is None else unused)
+    return _checked(file, np.arange(count, dtype=np.float64) * record.step, record.heights, notes)
 
 
 def _checked(
     file: Path, v: NDArray[np.float64], n: NDArray[np.float64], notes: tuple[str, ...]
 ) -> ProfileFile:
-    measured = np.isfinite(v) & np.isfinite(n)
-    points = np.stack([v, n], axis=-1)[measured]
-    if not measured.all():
-        dropped = int(np.sum(~measured))
-        word = "point without a height was" if dropped == 1 else "points without a height were"
-        notes += (f"{dropped} {word} dropped.",)
-    if len(points) < FEWEST_POINTS:
-        without = f", {np.sum(~measured)} more without a height" * bool((~measured).any())
-        expected = f"at least {FEWEST_POINTS}, a line each"
-        raise BadInput(file, "number of points", f"{len(points)}{without}", expected)
-    at = np.flatnonzero(measured)
+    """Drop points that are none or repeat the one before; refuse what is then no profile."""
+    at = np.flatnonzero(np.isfinite(v) & np.isfinite(n))
     is_gap = np.diff(at) > 1
     gaps = np.stack([v[at[:-1][is_gap]], v[at[1:][is_gap]]], axis=-1)
-    repeated = (np.diff(points, axis=0) == 0).all(axis=1)
-    if repeated.any():
-        count = int(repeated.sum())
-        word = "point that repeats" if count == 1 else "points that repeat"
-        notes += (f"{count} {word} the one before {'was' if count == 1 else 'were'} dropped.",)
-        points = points[np.concatenate([[True], ~repeated])]
-    if (points[:, 1] == points[0, 1]).all():
-        found = f"{points[0, 1]:g} µm at every point"
-        raise BadInput(file, "height", found, "a profile with relief")
+    points = np.stack([v[at], n[at]], axis=-1)
+    is_new = np.ones(len(at), np.bool_)
+    is_new[1:] = (points[1:] != points[:-1]).any(axis=1)
+    missing, repeated = len(v) - len(at), int(np.sum(~is_new))
+    for count, one, several in (
+        (missing, "point without a height was", "points without a height were"),
+        (
+            repeated,
+            "point that repeats the one before was",
+            "points that repeat the one before were",
+        ),
+    ):
+        if count:
+            notes += (f"{count} {one if count == 1 else several} dropped.",)
+    points = points[is_new]
     if len(points) < FEWEST_POINTS:
-        raise BadInput(
-            file, "number of points", f"{len(points)} that differ", f"at least {FEWEST_POINTS}"
-        )
-    if not np.ptp(points[:, 0]) > 0:
-        found = f"{points[0, 0]:g} µm at every point"
-        raise BadInput(file, "position", found, "points beside each other")
+        found = f"{len(points)}{f', {missing} more without a height' if missing else ''}"
+        expected = f"at least {FEWEST_POINTS} that differ, a line each"
+        raise BadInput(file, "number of points", found, expected)
+    for column, axis, expected in (
+        (1, "height", "a profile with relief"),
+        (0, "position", "points beside each other"),
+    ):
+        if (points[:, column] == points[0, column]).all():
+            raise BadInput(file, axis, f"{points[0, column]:g} µm at every point", expected)
     return ProfileFile(points, notes, gaps)
-
-
-def _too_many(file: Path, count: int) -> BadInput:
-    expected = f"at most {MOST_POINTS}: export the surroundings of the scratch alone"
-    return BadInput(file, "number of points", f"{count}", expected)

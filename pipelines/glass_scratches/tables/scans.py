@@ -22,7 +22,7 @@ FLATTEST, DEEPEST = 1e-3, 20.0
 _MOST_POINTS = 1024  # the exact table takes their third power: half a second
 _MOST_MISSING = 0.1  # of the opening
 _MAD = 1.4826  # deviation of a normal distribution over its median absolute deviation
-_CREST = 4.0  # deviations above the land that roughness does not reach
+_CREST = 5.0  # deviations above the land that roughness does not reach
 _REACHED = 0.005  # of the depth: a groove's edge may be as soft
 _LEAST_CREST = 0.02  # of the depth: where the land has no roughness
 

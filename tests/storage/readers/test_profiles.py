@@ -308,7 +308,7 @@ REFUSED: list[tuple[str | bytes, str]] = [
     ("0,0\n-inf,1\n2,0\n", "line 2 is '-inf,1'; expected numbers"),
     ("0,0\n1e999,1\n2,0\n", "line 2 is '1e999,1'; expected numbers"),
     ("x,v,n\n0,1,1e999\n1,2,3\n2,3,4\n", "n on line 2 is '1e999'; expected a finite number"),
-    ("0,0\n# and\n0.0,-0.0\n2,1\n", f"{FEW} 2 that differ; expected at least 3"),
+    ("0,0\n# and\n0.0,-0.0\n2,1\n", f"{FEW} 2; expected at least 3 that differ"),
     ("0,2.5\n1,2.5\n2,2.5\n", "height is 2.5 µm at every point; expected a profile with relief"),
     ("1,0\n1,2\n1,3\n", "position is 1 µm at every point; expected points beside each other"),
     (
