@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from benchmarks.captures import light_probes, photographs, profiles
+from benchmarks.captures import gltf, light_probes, photographs, profiles
 from benchmarks.captures.case import Case
 
 CASES: dict[str, tuple[Case, ...]] = {
+    "gltf": gltf.CASES,
     "light_probes": light_probes.CASES,
     "photographs": photographs.CASES,
     "profiles": profiles.CASES,

@@ -15,6 +15,7 @@ from storage.readers.references import file_beside
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 _LARGEST_IMAGE = 256 << 20
+_DATA = "bytes in base64 or with percent signs: export it anew"
 
 
 class Buffers:
@@ -80,7 +81,7 @@ class Buffers:
         try:
             data = data_of(uri, self._container.embedded)
         except ValueError as error:
-            raise BadInput(self.file, field, f"a data URI with {error}", "base64") from None
+            raise BadInput(self.file, field, f"a data URI with {error}", _DATA) from None
         if data is not None:
             return data
         there = _found(self.file, uri)
