@@ -8,6 +8,7 @@ from benchmarks.captures.case import Case
 CASES: dict[str, tuple[Case, ...]] = {
     "gltf": gltf.CASES,
     "light_probes": light_probes.CASES,
+    "materials": materials.CASES,
     "photographs": photographs.CASES,
     "profiles": profiles.CASES,
 }

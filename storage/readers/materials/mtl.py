@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -57,9 +58,9 @@ def read_library(file: Path) -> tuple[dict[str, Description], dict[str, tuple[st
 
     Raises BadInput, naming the line, for numbers that are missing, or no finite numbers.
     """
-    text = whole_file(file, "a material library", _LARGEST_LIBRARY).decode("utf-8-sig", "replace")
-    if "\0" in text[:100]:
-        text = text.replace("\0", "")  # UTF-16 of plain letters
+    data = whole_file(file, "a material library", _LARGEST_LIBRARY)
+    is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = data.decode("utf-16" if is_wide else "utf-8-sig", "replace")
     materials: dict[str, _Statements] = {}
     current: _Statements | None = None
     for row, line in enumerate(_lines(text), start=1):
@@ -93,6 +94,7 @@ class _Statements:
         self._file, self._name = file, name
         self._numbers: dict[str, list[float]] = {}
         self._maps: dict[str, Map] = {}
+        self._named: set[str] = set()  # maps, missing ones as well
 
     def add(self, keyword: str, rest: str) -> None:
         """One line; raises ValueError with what was expected."""
@@ -101,6 +103,7 @@ class _Statements:
             self.notes += [self._said(note) for note in notes]
             if found is not None:
                 self._maps[_MAPS[keyword]] = found
+            self._named.add(_MAPS[keyword])
             return
         words = rest.split("#", 1)[0].split()
         if keyword in ("kd", "ks", "ke"):
@@ -129,8 +132,8 @@ class _Statements:
         """Of all lines; notes on what of them is not used are added."""
         plain, maps = grey(self._name), self._maps
         base = self._colour("kd", plain.base)
-        if "map_kd" in maps and (max(base) == 0 or "kd" not in self._numbers):
-            base = (1.0, 1.0, 1.0)
+        if "map_kd" in self._named and (max(base) == 0 or "kd" not in self._numbers):
+            base = (1.0, 1.0, 1.0) if "map_kd" in maps else plain.base
         metal = self._share("pm", 1.0 if "map_pm" in maps else 0.0)
         shiny = self._one("illum", 2.0) not in (0.0, 1.0)
         missing = (DIELECTRIC,) * 3 if metal > 0 else plain.specular
