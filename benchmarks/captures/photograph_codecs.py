@@ -120,7 +120,7 @@ _AVIFS = (
         "AVIF: colours by code points",
         is_light(in_srgb(_pq(_ten / 1023), REC_2020), 0.02),
         _save_avif(10, _ten, 9, 16),
-        "Rec. 2020, PQ",
+        "BT.2020, PQ",
     ),
     *(
         _case(

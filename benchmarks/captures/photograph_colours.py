@@ -18,12 +18,15 @@ from benchmarks.captures.photograph_files import (
     in_srgb,
     ink_profile,
     is_light,
+    lab_of_scanner,
     light_of,
     noise,
+    rgb_of_lab,
     rgb_profile,
     save_pillow,
     save_png,
     save_tiff,
+    scanner_profile,
     slope,
     thrice,
 )
@@ -47,6 +50,7 @@ def _by_profile(codes: NDArray[Any], primaries: Any, gamma: float) -> NDArray[np
 # ---- profiles ----------------------------------------------------------------------------------
 
 _DEEP, _PLAIN, _GREY = noise(np.uint16), noise(), noise(np.uint16, 1)
+_EXTREME = (_PLAIN > 127).astype(np.uint8) * 255
 _FLOAT = noise(np.float32) / 4
 _G18 = round(1.8 * 256) / 256
 _PROFILES = (
@@ -103,6 +107,15 @@ _PROFILES = (
             ("webp", _PLAIN, 2e-3, {"lossless": True}),
             ("avif", slope(), 0.03, {"quality": 95, "subsampling": "4:4:4"}),
         )
+    ),
+    Case(
+        "photo_scanner.png",
+        "a profile by tables",
+        read_photograph,
+        "told",
+        ["profile 'made by hand'"],
+        is_light(rgb_of_lab(lab_of_scanner(_EXTREME / 255)), 2e-3),
+        save_png(_EXTREME, 2, iccp(scanner_profile())),
     ),
     Case(
         "photo_float_gamma.tif",

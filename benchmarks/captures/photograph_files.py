@@ -145,15 +145,31 @@ def lab_of_inks(inks: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def ink_profile() -> bytes:
-    """A profile for CMYK by a table of two steps an ink (`mft2`), of which corners are exact."""
-    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
-    lab = lab_of_inks(corners)
+    """A profile for CMYK by a table."""
+    return _table_profile(b"CMYK", 4, lab_of_inks)
+
+
+def scanner_profile() -> bytes:
+    """A profile for RGB by a table: of red, green and blue as of the other inks."""
+    return _table_profile(b"RGB ", 3, lab_of_scanner)
+
+
+def lab_of_scanner(light: NDArray[Any]) -> NDArray[np.float64]:
+    """What ``scanner_profile`` has at its 8 corners, of R, G and B of 0 or 1."""
+    inks = np.concatenate([1 - light, np.zeros((*light.shape[:-1], 1))], axis=-1)
+    return lab_of_inks(inks)
+
+
+def _table_profile(space: bytes, channels: int, lab_of: Any) -> bytes:
+    """A table of two steps a channel (`mft2`), of which the corners are exact."""
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * channels, indexing="ij"), axis=-1)
+    lab = lab_of(corners.reshape(-1, channels))
     codes = np.rint(np.column_stack([lab[:, 0] * 652.8, (lab[:, 1:] + 128) * 256]))
     straight = struct.pack(">HH", 0, 65535)
-    data = b"mft2" + bytes(4) + bytes([4, 3, 2, 0]) + _fixed(1, 0, 0, 0, 1, 0, 0, 0, 1)
-    data += struct.pack(">HH", 2, 2) + straight * 4
+    data = b"mft2" + bytes(4) + bytes([channels, 3, 2, 0]) + _fixed(1, 0, 0, 0, 1, 0, 0, 0, 1)
+    data += struct.pack(">HH", 2, 2) + straight * channels
     data += codes.astype(">u2").tobytes() + straight * 3
-    return icc(b"CMYK", {b"A2B0": data}, b"Lab ")
+    return icc(space, {b"A2B0": data}, b"Lab ")
 
 
 # ---- files -------------------------------------------------------------------------------------

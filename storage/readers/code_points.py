@@ -25,7 +25,7 @@ _PRIMARIES: dict[int, Primaries] = {
     11: (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.314, 0.351),
     12: (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
 }  # ITU-T H.273, table 2
-_NAMES = {9: "Rec. 2020", 11: "DCI-P3", 12: "Display P3"}
+_NAMES = {9: "BT.2020", 11: "DCI-P3", 12: "Display P3"}
 _SRGB_LIKE = (1, 2, 6, 13, 14, 15)
 """Camera curves of television (1, 6, 14, 15) are shown like sRGB's, as by all browsers."""
 _WHITE = 203.0

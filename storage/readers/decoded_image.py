@@ -85,7 +85,7 @@ def by_code_points(
             file,
             "colour code points",
             f"primaries {points.primaries}, transfer {points.transfer}",
-            "those of sRGB, Display P3, Rec. 2020, PQ or HLG; export it as sRGB",
+            "those of sRGB, Display P3, BT.2020, PQ or HLG; export it as sRGB",
         )
     values = stored.values
     if not is_full_range:
