@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.captures import gltf, light_probes, photographs, profiles
+from benchmarks.captures import gltf, light_probes, materials, photographs, profiles
 from benchmarks.captures.case import Case
 
 CASES: dict[str, tuple[Case, ...]] = {
