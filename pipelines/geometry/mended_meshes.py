@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry.meshes import Mesh, check_mesh, vertex_normals
-from pipelines.geometry.repair import repair_mesh
+from pipelines.geometry.repair import RepairedMesh, repair_mesh
 from pipelines.geometry.texture_coordinates import texture_stretch, unwrap
 
 MOST_STRETCH = 3.0
@@ -43,7 +43,7 @@ def mend_mesh(
     """
     points, faces = np.array(vertices, np.float64), np.asarray(triangles)
     check_mesh(points, faces)
-    mended = repair_mesh(points, faces)
+    mended = _from_lowest_corner(repair_mesh(points, faces))
     notes = list(mended.notes)
     if uvs is None:
         corner_uvs = _unwrapped(mended.vertices, mended.triangles)
@@ -58,6 +58,16 @@ def mend_mesh(
     faces = corner.reshape(-1, 3).astype(np.int32)
     mesh = Mesh(split, faces, corner_uvs.reshape(-1, 2)[first], vertex_normals(split, faces))
     return MendedMesh(mesh, tuple(notes))
+
+
+def _from_lowest_corner(mesh: RepairedMesh) -> RepairedMesh:
+    """Each triangle's corners from the first vertex on: charts and pictures depend a little on
+    where a triangle begins, and a file that is inside out begins elsewhere than its twin."""
+    order = (np.arange(3) + mesh.triangles.argmin(axis=1)[:, None]) % 3
+    return mesh._replace(
+        triangles=np.take_along_axis(mesh.triangles, order, axis=1),
+        corners=np.take_along_axis(mesh.corners, order, axis=1),
+    )
 
 
 def _mapped(

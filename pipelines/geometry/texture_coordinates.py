@@ -32,17 +32,14 @@ def unwrap(
     if not radius > 0:
         raise ValueError("all vertices are at one position; expected a surface")
     atlas = xatlas.Atlas()
-    # In units of the radius: xatlas takes floats and has absolute tolerances. The charts depend on
-    # which corner of a triangle is the first one: the lowest, whatever the file's order.
-    shift = (np.arange(3) + triangles.argmin(axis=1)[:, None]) % 3
-    ordered = np.take_along_axis(triangles, shift, axis=1)
-    atlas.add_mesh((centred / radius).astype(np.float32), ordered.astype(np.uint32))
+    # In units of the radius: xatlas takes floats and has absolute tolerances.
+    atlas.add_mesh((centred / radius).astype(np.float32), triangles.astype(np.uint32))
     options = xatlas.PackOptions()
     options.texels_per_unit = 256.0  # sets the packing's precision and the unit of its size
     atlas.generate(pack_options=options)
     sources, faces, uvs = atlas[0]
     size = np.array([atlas.width, atlas.height], np.float64)
-    faces = np.take_along_axis(faces.astype(np.int64), np.argsort(shift, axis=1), axis=1)
+    faces = faces.astype(np.int64)
     return vertices[sources], faces, _not_mirrored(uvs * size / options.texels_per_unit, faces)
 
 
