@@ -11,7 +11,7 @@ from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.ssdf_lighting.datasets import clusters_dataset, distance_blocks
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.ssdf_lighting import figures
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
@@ -116,9 +116,12 @@ def triangle_clusters(
         lambda fraction: progress(0.8 * fraction),
     )
     vertices, triangles = scene_mesh["vertices"].values, scene_mesh["triangles"].values
-    count, seed = settings.clusters, settings.cluster_seed
+    # Of few triangles none has more than a few to be compressed with.
+    count, seed = min(settings.clusters, max(1, len(triangles) // 4)), settings.cluster_seed
     if settings.space == "positions":
         found = triangle_clusters.clusters_by_position(vertices, triangles, count, seed)
     else:
         found = triangle_clusters.clusters_by_distance(basis.coordinates, triangles, count, seed)
-    return clusters_dataset(found, basis), {"components": len(basis.sigma)}
+    fewer = f"{count} clusters instead of {settings.clusters}: there are {len(triangles)} triangles."
+    notes = [fewer] if count < settings.clusters else []
+    return clusters_dataset(found, basis), {"components": len(basis.sigma), NOTES: notes}

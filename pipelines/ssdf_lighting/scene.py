@@ -104,7 +104,7 @@ def make_scene(
     smooth = creased_normals(mended.vertices, mended.triangles, _CREASE)
     rows = mended.kept
     if textures is not None:
-        textures = _repaired_textures(textures, points[corners], mended)
+        textures = _repaired_textures(textures, corners, mended)
     if longest < math.inf:
         fine = refine_mesh(mended.vertices, mended.triangles, longest)
         rows, smooth = rows[fine.owner], _unit(fine.weights @ smooth[fine.owner])
@@ -129,13 +129,11 @@ def make_scene(
 
 
 def _repaired_textures(
-    textures: SurfaceTextures, given: FloatArray, mended: RepairedMesh
+    textures: SurfaceTextures, given: NDArray[np.integer], mended: RepairedMesh
 ) -> SurfaceTextures:
-    """``given`` (F, 3, 3), the corners before the repair, which turns some triangles over."""
-    second = given[mended.kept, 1]
-    apart = np.linalg.norm(mended.vertices[mended.triangles] - second[:, None], axis=2)
-    order = np.where((apart[:, 2] < apart[:, 1])[:, None], [0, 2, 1], [0, 1, 2])
-    rows = mended.kept[:, None]
+    """``given`` (F, 3), the triangles before the repair, which turns some of them over."""
+    same = mended.corners[:, :, None] == given[mended.kept][:, None, :]
+    rows, order = mended.kept[:, None], same.argmax(axis=2)
     return textures._replace(uvs=textures.uvs[rows, order], colours=textures.colours[rows, order])
 
 
