@@ -45,6 +45,8 @@ class LazyPhotographs(NamedTuple):
     """Photographs first … last - 1, all of one view: (image, y, x, 3) linear RGB."""
     about: dict[str, str]
     """Where they come from, in words."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what was converted, mended or left out of a user's files."""
 
 
 def btf_images_dataset(photographs: LazyPhotographs, name: str) -> xr.Dataset:
@@ -71,7 +73,7 @@ def _lazy_images(photographs: LazyPhotographs) -> Any:
     import dask.array as da
     import numpy as np
 
-    pairs, height, width, block, read, _ = photographs
+    pairs, height, width, block, read, *_ = photographs
 
     def half(first: int, last: int) -> NDArray[np.float16]:
         values = read(first, last)

@@ -21,7 +21,7 @@ NONE = "none"
 
 def _check_material(source: Source, settings: Mapping[str, Any]) -> None:
     if source.path is not None:
-        open_btf(source.path, settings.get("crop"))
+        open_btf(source.path, settings.get("crop"), settings.get("exr_colours", "auto"))
     elif settings.get("crop") is not None:
         raise ValueError(f"crop is set for {source.name}; expected a BTF of yours.")
 

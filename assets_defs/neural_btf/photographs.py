@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
@@ -17,9 +16,10 @@ from assets_defs.neural_btf.datasets import (
     photograph_blocks,
 )
 from assets_defs.neural_btf.declaration import BTF
+from assets_defs.neural_btf.measured import measured_photographs
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.neural_btf import figures
 from storage.readers.btf import open_btf
 from storage.schemas import neural_btf as schemas
@@ -36,6 +36,26 @@ class ImageSettings(Settings):
 
     crop: tuple[int, int, int, int] | None = Field(
         None, description="Left, top, width, height in pixels; whole photographs by default"
+    )
+    orientation: Literal[
+        "auto",
+        "upright",
+        "turned 90",
+        "turned 180",
+        "turned 270",
+        "mirrored",
+        "mirrored, turned 90",
+        "mirrored, turned 180",
+        "mirrored, turned 270",
+    ] = Field(
+        "auto",
+        description="How your photographs lie in their files: mirrored or not, then turned "
+        "counter-clockwise; auto: as their relief says",
+    )
+    exr_colours: Literal["auto", "rgb", "xyz"] = Field(
+        "auto",
+        description="What R, G, B of your EXR files hold; auto: what their chromaticities say, "
+        "else by their names and values",
     )
     texels: int = Field(48, ge=4, le=1024, description="Virtual cloth: texels a side")
     directions: Literal[15, 41, 81, 151] = Field(
@@ -55,7 +75,7 @@ def texels_and_photographs(material: Source, settings: Settings) -> tuple[int, i
     assert isinstance(settings, ImageSettings)
     if material.path is None:
         return settings.texels**2, settings.directions**2
-    measured = open_btf(material.path, settings.crop)
+    measured = open_btf(material.path, settings.crop, settings.exr_colours)
     return measured.height * measured.width, measured.images
 
 
@@ -78,22 +98,17 @@ def _mean_radiance(version: StoredVersion) -> float:
     return figures.mean_radiance(photograph_blocks(version.dataset["images"]))
 
 
-def _measured(path: Path, settings: ImageSettings) -> LazyPhotographs:
-    """Photographs of the user's."""
-    from pipelines.light.directions import Pairs
+def _orientation_margin(version: StoredVersion) -> float | None:
+    """None where photographs show no relief, and where their user has said how they lie."""
+    from pipelines.neural_btf.orientation import central_patch, orientation_scores
 
-    measured = open_btf(path, settings.crop)
-    about = {"layout": measured.layout, "colour": measured.colour}
-    if measured.shifted_lights:
-        about["shifted lights"] = f"{measured.shifted_lights} photographs, nominal angles kept"
-    return LazyPhotographs(
-        Pairs(measured.light, measured.view),
-        measured.height,
-        measured.width,
-        measured.lights_per_view,
-        measured.read,
-        about,
-    )
+    if version.record["settings"]["orientation"] != "auto":
+        return None
+    images = version.dataset["images"]
+    left, top, width, height = central_patch(images.sizes["y"], images.sizes["x"])
+    middle = images[:, top : top + height, left : left + width]
+    scores = orientation_scores(pairs_of(version.dataset), lambda chosen: middle[chosen].values)
+    return scores.margin("upright") if scores is not None and scores.are_clear else None
 
 
 def _virtual(material: str, settings: ImageSettings) -> LazyPhotographs:
@@ -175,16 +190,28 @@ def _telling(photographs: LazyPhotographs, progress: Progress) -> LazyPhotograph
             at_most=10.0,
             change=0.005,
         ),
+        Check(
+            "orientation_margin",
+            "How much better the relief explains the photographs as they lie than turned or "
+            "mirrored.",
+            _orientation_margin,
+            at_least=0.0,
+        ),
     ),
 )
 def btf_images(settings: ImageSettings, source: Source, progress: Progress) -> Result:
     """Open the photographs, or photograph the virtual cloth; both lazily, view by view."""
     photographs = (
-        _virtual(source.key, settings) if source.path is None else _measured(source.path, settings)
+        _virtual(source.key, settings)
+        if source.path is None
+        else measured_photographs(
+            source.path, settings.crop, settings.exr_colours, settings.orientation
+        )
     )
     shown = {
         "photographs": len(photographs.pairs.light),
         "texels": photographs.height * photographs.width,
         **photographs.about,
+        NOTES: photographs.notes,
     }
     return btf_images_dataset(_telling(photographs, progress), source.name), shown

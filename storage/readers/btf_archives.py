@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from storage.readers.bad_input import BadInput
+from storage.readers.btf_names import photograph_name
 from storage.readers.opening import check_file, first_bytes
 
 LARGEST_MEMBER = 64_000_000
@@ -96,13 +97,14 @@ class ZipMembers:
     def _checked(self, name: str) -> _ZipMember:
         member = self.members[name]
         if member.encrypted:
-            raise BadInput(self.path / name, "content", "encrypted", "a zip without a password")
+            expected = "a zip without a password: unpack it to a folder"
+            raise BadInput(self.path / name, "content", "encrypted", expected)
         if member.method not in (_STORED, _DEFLATED):
             raise BadInput(
                 self.path / name,
                 "zip compression",
                 f"method {member.method}",
-                f"stored ({_STORED}) or deflated ({_DEFLATED})",
+                f"stored ({_STORED}) or deflated ({_DEFLATED}): unpack it to a folder",
             )
         _check_size(self.path / name, member.size)
         return member
@@ -166,18 +168,71 @@ def zip_members(path: Path) -> ZipMembers:
 
 
 @dataclass(frozen=True)
+class JoinedMembers:
+    """The members of all zips in a folder: a database in parts."""
+
+    path: Path
+    places: dict[str, tuple[ZipMembers, str]]
+
+    def names(self) -> list[str]:
+        """Paths inside, each behind its zip's."""
+        return list(self.places)
+
+    def size(self, name: str) -> int:
+        """Bytes of a member, unpacked."""
+        archive, member = self.places[name]
+        return archive.size(member)
+
+    def start(self, name: str, count: int) -> bytes:
+        """About a member's first ``count`` bytes."""
+        archive, member = self.places[name]
+        return archive.start(member, count)
+
+    def whole(self, name: str) -> bytes:
+        """A member's content."""
+        archive, member = self.places[name]
+        return archive.whole(member)
+
+
+def folder_members(path: Path) -> Members:
+    """The files under a folder, or in the zips there where it holds nothing else but documents.
+
+    Raises BadInput where a zip's directory cannot be read.
+    """
+    folder = FolderMembers(path)
+    names = folder.names()
+    zips = [name for name in names if name.lower().endswith(".zip")]
+    if not zips or any(photograph_name(name) for name in names):
+        return folder
+    archives = {name: zip_members(path / name) for name in zips}
+    return JoinedMembers(
+        path,
+        {
+            f"{name}/{member}": (archive, member)
+            for name, archive in archives.items()
+            for member in archive.names()
+        },
+    )
+
+
+@dataclass(frozen=True)
 class FolderMembers:
     """The files under a folder."""
 
     path: Path
 
     def names(self) -> list[str]:
-        """Paths inside, sorted; linked folders are not followed."""
-        found = [
-            (Path(folder) / file).relative_to(self.path).as_posix()
-            for folder, _, files in os.walk(self.path, followlinks=True)
-            for file in files
-        ]
+        """Paths inside, sorted; links to folders are followed, but not round in circles."""
+        found: list[str] = []
+        seen: set[tuple[int, int]] = set()
+        for folder, below, files in os.walk(self.path, followlinks=True):
+            here = os.stat(folder)
+            if (here.st_dev, here.st_ino) in seen:
+                below.clear()
+                continue
+            seen.add((here.st_dev, here.st_ino))
+            below.sort()
+            found += [(Path(folder) / file).relative_to(self.path).as_posix() for file in files]
         return sorted(found)
 
     def size(self, name: str) -> int:

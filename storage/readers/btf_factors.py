@@ -17,23 +17,55 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_measured import Crop
 
-PLAIN_RGB, LOG_YUV = 0, 11
-COLOUR_MODELS = (PLAIN_RGB, LOG_YUV)
+RGB, YUV, PCA, YCOCG, LOG_Y_UV, LOG_YUV, LOG_Y_RATIOS, LOG_RGB = 0, 1, 3, 4, 9, 10, 11, 12
+COLOUR_MODELS = (RGB, YUV, PCA, YCOCG, LOG_Y_UV, LOG_YUV, LOG_Y_RATIOS, LOG_RGB)
 """btflib's numbers of the models that are understood; UBO2014 has 11."""
 
-_OFFSET = np.float32(1e-5)  # what was added to Y before the logarithm
+_OFFSET = np.float32(1e-5)  # what was added before a logarithm
+_RGB_OF_YUV = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]], np.float32)
+_RGB_OF_YCOCG = np.array([[1, 1, -1], [1, 0, 1], [1, -1, -1]], np.float32)
+_MATRICES = {
+    YUV: _RGB_OF_YUV, YCOCG: _RGB_OF_YCOCG, LOG_Y_UV: _RGB_OF_YUV, LOG_YUV: _RGB_OF_YUV,
+    LOG_Y_RATIOS: _RGB_OF_YUV,
+}  # fmt: skip
 _ROWS_AT_ONCE = 64  # of pixels: bounds the single-precision copy of S V
 
 
 class ChannelFactors(NamedTuple):
-    """Where a channel's factors lie in the file: ``scalar``, a NumPy type; U, images x components,
-    at ``u_at``; S V, pixels x components, at ``sxv_at``.
+    """Where a channel's factors lie in the file: ``scalar``, a NumPy type; what belongs to the
+    images, images x components, at ``u_at``; to the pixels, pixels x components, at ``sxv_at``.
     """
 
     scalar: str
     components: int
     u_at: int
     sxv_at: int
+
+
+@dataclass(frozen=True, eq=False)
+class ColourModel:
+    """``number``: btflib's. ``mean`` (3,), ``matrix`` (3, 3): of principal components, as rows."""
+
+    number: int
+    mean: NDArray[np.float32]
+    matrix: NDArray[np.float32]
+
+    def to_rgb(self, light: NDArray[np.float32]) -> None:
+        """(y, x, 3) of the model to RGB, in place; what is not finite is for the caller to see."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self.number == LOG_RGB:
+                light[:] = np.exp(light) - _OFFSET
+            if self.number in (LOG_Y_UV, LOG_YUV, LOG_Y_RATIOS):
+                light[..., 0] = np.exp(light[..., 0]) - _OFFSET
+            if self.number == LOG_Y_RATIOS:
+                light[..., 1:] *= light[..., :1] + _OFFSET
+            if self.number == LOG_YUV:
+                chroma = light[..., 1:]
+                chroma[:] = np.sign(chroma) * np.exp(np.abs(chroma)) * _OFFSET
+            if self.number == PCA:
+                light[:] = light @ self.matrix + self.mean
+            elif self.number in _MATRICES:
+                light[:] = light @ _MATRICES[self.number].T
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +76,7 @@ class FactoredPhotographs:
 
     path: Path
     channels: tuple[ChannelFactors, ...]
-    model: int
+    model: ColourModel
     size: tuple[int, int]
     crop: Crop
     cosines: NDArray[np.float32] | None
@@ -58,8 +90,7 @@ class FactoredPhotographs:
         for index, factors in enumerate(self.channels):
             self._multiply_into(block[..., index], factors, first, last)
         for image, light in enumerate(block, start=first):
-            if self.model == LOG_YUV:
-                _rgb_of_log_yuv(light)
+            self.model.to_rgb(light)
             if self.cosines is not None:
                 light *= self.cosines[image]
             if not np.isfinite(light).all():
@@ -99,15 +130,3 @@ class FactoredPhotographs:
             raise BadInput(
                 self.path, "size", f"{self.path.stat().st_size} bytes", "what it was when opened"
             ) from None
-
-
-def _rgb_of_log_yuv(light: NDArray[np.float32]) -> None:
-    """(y, x, 3) log(Y + 1e-5), U / (Y + 1e-5), V / (Y + 1e-5) to RGB, in place."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        y_offset = np.exp(light[..., 0])
-        y = y_offset - _OFFSET
-        u = light[..., 1] * y_offset
-        v = light[..., 2] * y_offset
-        light[..., 0] = y + np.float32(1.13983) * v
-        light[..., 1] = y - np.float32(0.39465) * u - np.float32(0.5806) * v
-        light[..., 2] = y + np.float32(2.03211) * u

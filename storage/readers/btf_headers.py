@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_archives import Members
 from storage.readers.btf_measured import check_area
@@ -21,7 +19,6 @@ from storage.readers.opening import check_memory
 from storage.readers.picture_sizes import MEMORY_PER_BYTE
 from storage.readers.radiance_files import SIGNATURE, radiance_header
 
-_EIGHT_BITS = "8-bit RGB"
 _PNG_CHANNELS = {0: "grey", 2: "RGB", 3: "palette", 4: "grey with alpha", 6: "RGB with alpha"}
 _JPEG_CHANNELS = {1: "grey", 3: "RGB", 4: "CMYK"}
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0 ... SOF15
@@ -30,13 +27,12 @@ _EXR_NOT_FLAT = 0x800  # deep data
 _LONGEST_HEADER = 8_000_000  # bytes
 _MOST_BLOCKS = 10_000
 _PIXEL_BYTES = 40  # of one photograph while it is decoded
-_REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-_CIE_XYZ = (1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3)
 
 
 class Header(NamedTuple):
     """``format``: PNG, JPEG, EXR or HDR. ``pixels``: depth and channels in words, as in "8-bit RGB"
-    or "half CIE XYZ". ``planes``: an EXR's channels in the order of its colours.
+    or "half". ``planes``: an EXR's channels in the order of its colours; ``chromaticities``: an
+    EXR's, where it says them. ``notes``: sentences on what is converted or left out.
     """
 
     format: str
@@ -44,39 +40,53 @@ class Header(NamedTuple):
     height: int
     pixels: str
     planes: tuple[str, ...] = ()
+    chromaticities: tuple[float, ...] | None = None
+    has_alpha: bool = False
+    has_profile: bool = False
+    notes: tuple[str, ...] = ()
 
 
-def common_header(members: Members, names: Sequence[str]) -> Header:
-    """Read every photograph's header and return the one that all share.
+def common_header(members: Members, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
+    """Read every photograph's header and return the one that all share, and what is to be said.
 
-    Raises BadInput naming the first file that differs from the others (from the most of them), or
-    that has a format, depth or channels that no database has.
+    JPEG and PNG may be of any depth and channels each: ``pixels`` are then those of the most of
+    them, ``has_alpha`` and ``has_profile`` of any. Raises BadInput naming the first file that
+    differs from the others (from the most of them), or that cannot be read.
     """
     headers = [_header(members, name) for name in names]
     common = Counter(headers).most_common(1)[0][0]
     for name, header in zip(names, headers, strict=True):
-        file = members.path / name
-        if header.format != common.format:
-            raise BadInput(file, "format", header.format, f"{common.format} as in the other files")
-        if header.format in ("PNG", "JPEG") and header.pixels != _EIGHT_BITS:
-            raise BadInput(file, "pixel format", header.pixels, _EIGHT_BITS)
-        if header.pixels != common.pixels or header.planes != common.planes:
-            raise BadInput(
-                file, "pixel format", header.pixels, f"{common.pixels} as in the other files"
-            )
-        if header != common:
-            raise BadInput(
-                file,
-                "size",
-                f"{header.width} x {header.height} pixels",
-                f"{common.width} x {common.height} pixels as in the other files",
-            )
+        _check_alike(members.path / name, header, common)
     file, pixels = members.path / names[0], common.width * common.height
     check_area(file, common.width, common.height)
     found = f"{common.width} x {common.height} pixels"
     smallest = min(members.size(name) for name in names)
     check_memory(file, "size", found, _PIXEL_BYTES * pixels, smallest, MEMORY_PER_BYTE)
-    return common
+    notes = list(dict.fromkeys(note for header in headers for note in header.notes))
+    with_alpha = sum(header.has_alpha for header in headers)
+    if with_alpha:
+        notes.append(f"{with_alpha} photographs have an opaque alpha channel, which was left out.")
+    shared = common._replace(
+        has_alpha=with_alpha > 0, has_profile=any(header.has_profile for header in headers)
+    )
+    return shared, tuple(notes)
+
+
+def _check_alike(file: Path, header: Header, common: Header) -> None:
+    if header.format != common.format:
+        expected = f"{common.format} as in the other files: convert it, or move it elsewhere"
+        raise BadInput(file, "format", header.format, expected)
+    if (header.planes, header.chromaticities) != (common.planes, common.chromaticities):
+        names = ", ".join(common.planes)
+        expected = f"{names} of the same chromaticities as in the other files: save all alike"
+        raise BadInput(file, "colour", ", ".join(header.planes), expected)
+    if (header.width, header.height) != (common.width, common.height):
+        raise BadInput(
+            file,
+            "size",
+            f"{header.width} x {header.height} pixels",
+            f"{common.width} x {common.height} pixels as in the other files: cut all alike",
+        )
 
 
 def header_of(file: Path, data: bytes) -> Header:
@@ -87,17 +97,17 @@ def header_of(file: Path, data: bytes) -> Header:
     if data.startswith(b"\x89PNG\r\n\x1a\n"):
         return _png(data)
     if data.startswith(b"\xff\xd8\xff"):
-        return _jpeg(data)
+        return _jpeg(file, data)
     if data.startswith(b"\x76\x2f\x31\x01"):
         return _exr(file, data)
     if data.startswith(SIGNATURE):
         found = radiance_header(file, data)
-        return Header("HDR", found.width, found.height, "Radiance RGBE")
+        return Header("HDR", found.width, found.height, "Radiance RGBE", notes=found.notes)
     raise BadInput(
         file,
         "format",
         "unknown" if data else "unknown (the file is empty)",
-        "a JPEG, PNG, EXR or Radiance photograph",
+        "a JPEG, PNG, EXR or Radiance photograph: convert all of them",
     )
 
 
@@ -117,19 +127,21 @@ def _png(data: bytes) -> Header:
     if kind != b"IHDR":
         raise IndexError("a PNG begins with its header chunk")
     pixels = f"{depth}-bit {_PNG_CHANNELS.get(colour, 'unknown')}"
+    kinds = set()
     at = 8
     blocks = 0
     while kind != b"IDAT":
         blocks = _counted(blocks)
         at += 12 + length
         length, kind = struct.unpack_from(">I4s", data, at)
-        if kind == b"tRNS":
-            pixels += " with transparency"
-    return Header("PNG", width, height, pixels)
+        kinds.add(kind)
+    has_alpha = "alpha" in pixels or b"tRNS" in kinds
+    return Header("PNG", width, height, pixels, has_alpha=has_alpha, has_profile=b"iCCP" in kinds)
 
 
-def _jpeg(data: bytes) -> Header:
+def _jpeg(file: Path, data: bytes) -> Header:
     at = 2
+    has_profile = False
     blocks = 0
     while True:
         blocks = _counted(blocks)
@@ -143,9 +155,13 @@ def _jpeg(data: bytes) -> Header:
         if marker in _JPEG_FRAMES:
             depth, height, width, channels = struct.unpack_from(">BHHB", data, at + 4)
             pixels = f"{depth}-bit {_JPEG_CHANNELS.get(channels, f'{channels} channels')}"
-            return Header("JPEG", width, height, pixels)
+            if depth != 8 or channels not in (1, 3):
+                expected = "8-bit grey or RGB: save it as RGB"
+                raise BadInput(file, "pixel format", pixels, expected)
+            return Header("JPEG", width, height, pixels, has_profile=has_profile)
         if marker in (0xD9, 0xDA):  # end, or the scan: the frame had to come before
             raise IndexError("a frame is missing")
+        has_profile |= marker == 0xE2 and data[at + 4 : at + 16] == b"ICC_PROFILE\0"
         at += 2 + length
 
 
@@ -153,7 +169,7 @@ def _exr(file: Path, data: bytes) -> Header:
     """Of a file with several parts the first."""
     (flags,) = struct.unpack_from("<I", data, 4)
     if flags & _EXR_NOT_FLAT:
-        raise BadInput(file, "pixel format", "deep", "half or float channels")
+        raise BadInput(file, "pixel format", "deep", "flat pixels: save it flattened")
     attributes: dict[bytes, bytes] = {}
     at = 8
     blocks = 0
@@ -167,10 +183,16 @@ def _exr(file: Path, data: bytes) -> Header:
             raise IndexError("the header goes on")
         attributes[name] = data[at - size : at]
     left, top, right, bottom = struct.unpack("<4i", attributes.get(b"dataWindow", b""))
-    names, sample_type = _exr_channels(file, attributes.get(b"channels", b""))
-    space = _exr_space(file, names, attributes.get(b"chromaticities"))
+    planes, kind, others = _exr_channels(file, attributes.get(b"channels", b""))
+    given = attributes.get(b"chromaticities")
     return Header(
-        "EXR", max(right - left + 1, 0), max(bottom - top + 1, 0), f"{sample_type} {space}", names
+        "EXR",
+        max(right - left + 1, 0),
+        max(bottom - top + 1, 0),
+        kind,
+        planes,
+        None if given is None or not any(given) else struct.unpack("<8f", given),
+        notes=(f"Other channels were left out: {', '.join(others)}.",) if others else (),
     )
 
 
@@ -188,7 +210,8 @@ def _exr_text(data: bytes, at: int) -> tuple[bytes, int]:
     return data[at:end], end + 1
 
 
-def _exr_channels(file: Path, chlist: bytes) -> tuple[tuple[str, ...], str]:
+def _exr_channels(file: Path, chlist: bytes) -> tuple[tuple[str, ...], str, list[str]]:
+    """Those of the colours, their type, and the others."""
     found: dict[str, tuple[int, int, int]] = {}
     at = 0
     while chlist[at]:
@@ -196,30 +219,19 @@ def _exr_channels(file: Path, chlist: bytes) -> tuple[tuple[str, ...], str]:
         sample_type, across, down = struct.unpack_from("<i4xii", chlist, at)
         found[name.decode("latin-1")] = (sample_type, across, down)
         at += 16
+    by_name = {name.upper(): name for name in found}
     for names in (("X", "Y", "Z"), ("R", "G", "B")):
-        if set(names) == found.keys():
+        if set(names) <= by_name.keys():
             break
     else:
-        raise BadInput(
-            file, "channels", ", ".join(sorted(found)[:8]) or "none", "X, Y, Z or R, G, B alone"
-        )
-    kinds = set(found.values())
+        listed = ", ".join(sorted(found)[:8]) or "none"
+        expected = "R, G, B or X, Y, Z: save the picture's layer alone, spectra as RGB"
+        raise BadInput(file, "channels", listed, expected)
+    planes = tuple(by_name[name] for name in names)
+    kinds = {found[name] for name in planes}
     if kinds not in ({(1, 1, 1)}, {(2, 1, 1)}):
         types = ", ".join(sorted(_EXR_TYPES.get(kind[0], "unknown") for kind in kinds))
-        raise BadInput(
-            file, "channels", f"not alike or {types}", "half or float channels of one type and size"
-        )
-    return names, _EXR_TYPES[kinds.pop()[0]]
-
-
-def _exr_space(file: Path, names: tuple[str, ...], chromaticities: bytes | None) -> str:
-    """X, Y, Z are named; R, G, B are CIE XYZ too where the attribute says so (OpenEXR's way)."""
-    if names == ("X", "Y", "Z"):
-        return "CIE XYZ"
-    found = struct.unpack("<8f", chromaticities) if chromaticities is not None else _REC709
-    if np.allclose(found, _REC709, atol=2e-3):
-        return "RGB"
-    if np.allclose(found, _CIE_XYZ, atol=2e-3):
-        return "CIE XYZ"
-    text = ", ".join(f"{value:.4g}" for value in found)
-    raise BadInput(file, "chromaticities", text, "those of sRGB or of CIE XYZ")
+        expected = "half or float channels of one type and size: save them as half"
+        raise BadInput(file, "channels", f"not alike or {types}", expected)
+    others = sorted(found.keys() - set(planes))
+    return planes, _EXR_TYPES[kinds.pop()[0]], others

@@ -33,6 +33,7 @@ class MeasuredBTF:
     ``height``, ``width``: pixels, after the crop. Photographs stand view by view and inside a
     view light by light: image = view * lights_per_view + light. ``shifted_lights``: photographs
     whose light really stood beside the nominal one, because the camera was in its way (UTIA).
+    ``notes``: sentences on what was converted, mended or left out.
 
     Picklable, and any number of threads may read at once.
     """
@@ -48,6 +49,7 @@ class MeasuredBTF:
     lights_per_view: int
     shifted_lights: int
     photographs: Photographs
+    notes: tuple[str, ...] = ()
 
     @property
     def images(self) -> int:

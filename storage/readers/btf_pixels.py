@@ -1,12 +1,13 @@
 """One photograph of a BTF database to linear RGB.
 
 OpenCV decodes JPEG and PNG (a little faster than Pillow, without holding Python's lock), after the
-file's end has been seen: OpenCV before 5 fills what is missing and says nothing. 8-bit codes go
-through a table of 256 values. Orientation tags are not followed: these photographs are rectified.
+file's end has been seen: OpenCV before 5 fills what is missing and says nothing. Codes go through a
+table. Orientation tags are not followed: these photographs are rectified.
 """
 
 from __future__ import annotations
 
+import functools
 import io
 import zlib
 from pathlib import Path
@@ -18,82 +19,123 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_headers import Header
 from storage.readers.btf_measured import Crop
+from storage.readers.colour_profiles import without_profile
+from storage.readers.colour_spaces import ColourSpace
 from storage.readers.radiance_files import radiance_pixels
 
-_RGB_OF_XYZ = np.array(
-    [
-        [3.2409699419045226, -1.5373831775700940, -0.4986107602930034],
-        [-0.9692436362808796, 1.8759675015077202, 0.0415550574071756],
-        [0.0556300796969937, -0.2039769588889765, 1.0569715142428786],
-    ]
-)
-"""The inverse of IEC 61966-2-1's matrix at full precision: from its primaries and D65 white."""
 
-
-def colour_of(header: Header) -> str:
+def colour_of(header: Header, space: ColourSpace) -> str:
     """How the values of such files become linear RGB, in one line."""
-    if header.format == "EXR":
-        depth = "half float" if header.pixels.startswith("half") else "32-bit float"
-        if header.pixels.endswith("XYZ"):
-            return f"{depth} CIE XYZ (D65) converted to linear sRGB"
-        return f"{depth} linear RGB as stored"
     if header.format == "HDR":
         return "Radiance RGBE, exposure divided out, taken as linear sRGB"
-    return "8-bit sRGB decoded to linear RGB"
+    if header.format != "EXR":
+        bits = "16-bit" if header.pixels.startswith("16") else "8-bit"
+        return f"{bits} sRGB decoded to linear RGB"
+    depth = "half float" if header.pixels.startswith("half") else "32-bit float"
+    if space.to_srgb is None:
+        return f"{depth} linear RGB as stored"
+    name = "CIE XYZ (D65)" if space.name == "CIE XYZ" else space.name
+    return f"{depth} {name} converted to linear sRGB"
 
 
-def linear_light_into(
-    light: NDArray[np.float32], file: Path, data: bytes, header: Header, crop: Crop
-) -> None:
-    """Decode a photograph's file into (crop height, crop width, 3) float32 linear RGB.
+def linear_light(
+    file: Path, data: bytes, header: Header, space: ColourSpace, crop: Crop
+) -> tuple[NDArray[np.floating], tuple[str, ...]]:
+    """Decode a photograph's file into (crop height, crop width, 3) linear RGB, and what is to be
+    said.
 
     Raises BadInput where the content is truncated, damaged or not what the header said, and where
-    a float is not finite or a CIE XYZ value is negative.
+    pixels are transparent.
     """
-    if header.format in ("JPEG", "PNG"):
-        _eight_bits_into(light, file, data, header, crop)
-        return
     if header.format == "HDR":
-        colours = _same_size(file, radiance_pixels(file, data), header)[crop.box]
-        _check(file, colours, np.isfinite(colours), "a finite value", crop)
-        light[:] = colours
-        return
-    colours = _same_size(file, _exr_pixels(file, data, header), header)[crop.box]
-    _check(file, colours, np.isfinite(colours), "a finite value", crop)
-    if header.pixels.endswith("XYZ"):
-        _check(file, colours, colours >= 0, "0 or more", crop)
-        light[:] = colours @ _RGB_OF_XYZ.T
-    else:
-        light[:] = colours
+        return _same_size(file, radiance_pixels(file, data), header)[crop.box], ()
+    if header.format == "EXR":
+        colours = exr_pixels(file, data, header)[crop.box]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return space.converted(colours), ()
+    return _light_of_codes(file, data, header, crop)
 
 
-def _eight_bits_into(
-    light: NDArray[np.float32], file: Path, data: bytes, header: Header, crop: Crop
-) -> None:
+def exr_pixels(file: Path, data: bytes, header: Header) -> NDArray[Any]:
+    """(height, width, 3) half or float, in the order of the header's planes."""
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(io.BytesIO(data), separate_channels=True, num_threads=0) as exr:
+            channels = exr.channels()
+            planes = [channels[name].pixels for name in header.planes]
+        pixels = np.stack(planes, axis=-1)
+    except Exception as error:  # RuntimeError, ValueError and others by what is broken
+        raise _damaged(file, header) from error
+    return _same_size(file, pixels, header)
+
+
+def _light_of_codes(
+    file: Path, data: bytes, header: Header, crop: Crop
+) -> tuple[NDArray[np.floating], tuple[str, ...]]:
     import cv2
 
     complete = _complete_png if header.format == "PNG" else _complete_jpeg
     if not complete(data):
         raise _damaged(file, header)
+    flags = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+    if header.has_alpha:
+        flags = cv2.IMREAD_UNCHANGED
     try:
-        codes = cv2.imdecode(
-            np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
-        )
+        codes = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error:
         codes = None
-    if codes is None or codes.dtype != np.uint8:
+    if codes is None or codes.dtype not in (np.uint8, np.uint16):
         raise _damaged(file, header)
-    cv2.LUT(_same_size(file, codes, header)[crop.box], _SRGB_CURVE, light)
+    if header.has_alpha:
+        codes = _opaque(file, codes, crop)
+    codes = _same_size(file, codes, header)[crop.box]
+    if header.has_profile:
+        light, notes = without_profile(codes, _profile(file, data, header))
+        if light.dtype == np.float32:
+            return light, notes
+        return _table(codes.dtype)[codes], notes
+    if codes.dtype == np.uint8:
+        return np.asarray(cv2.LUT(codes, _table(codes.dtype)), np.float32), ()
+    return _table(codes.dtype)[codes], ()
 
 
-def _srgb_curve() -> NDArray[np.float32]:
-    """Linear light of the 256 codes (IEC 61966-2-1, 5.2)."""
-    encoded = np.arange(256) / 255
+def _opaque(file: Path, codes: NDArray[Any], crop: Crop) -> NDArray[Any]:
+    """RGB of OpenCV's grey or BGR, with alpha or where it has dropped one that is opaque."""
+    if codes.ndim == 2:
+        codes = codes[..., None]
+    channels = codes.shape[2]
+    clear = float((codes[crop.box][..., -1] < np.iinfo(codes.dtype).max).mean())
+    if channels in (2, 4) and clear > 0:
+        raise BadInput(
+            file,
+            "alpha channel",
+            f"not opaque at {clear:.1%} of the pixels",
+            "opaque photographs: crop them, or save them without alpha",
+        )
+    if channels <= 2:
+        return np.repeat(codes[..., :1], 3, axis=2)
+    return np.ascontiguousarray(codes[..., 2::-1])
+
+
+@functools.cache
+def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
+    """Linear light of all codes (IEC 61966-2-1, 5.2)."""
+    most = int(np.iinfo(dtype).max)
+    encoded = np.arange(most + 1) / most
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return linear.astype(np.float32)
 
 
-_SRGB_CURVE = _srgb_curve()
+def _profile(file: Path, data: bytes, header: Header) -> bytes | None:
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            found = image.info.get("icc_profile")
+    except Exception as error:  # decoders of damaged data raise nearly anything
+        raise _damaged(file, header) from error
+    return found if isinstance(found, bytes) else None
 
 
 def _complete_jpeg(data: bytes) -> bool:
@@ -125,37 +167,10 @@ def _complete_png(data: bytes) -> bool:
     return False
 
 
-def _exr_pixels(file: Path, data: bytes, header: Header) -> NDArray[Any]:
-    """(y, x, 3) half or float, in the order of the header's planes."""
-    import OpenEXR
-
-    try:
-        with OpenEXR.File(io.BytesIO(data), separate_channels=True, num_threads=0) as exr:
-            channels = exr.channels()
-            planes = [channels[name].pixels for name in header.planes]
-        return np.stack(planes, axis=-1)
-    except Exception as error:  # RuntimeError, ValueError and others by what is broken
-        raise _damaged(file, header) from error
-
-
 def _same_size(file: Path, pixels: NDArray[Any], header: Header) -> NDArray[Any]:
     if pixels.shape != (header.height, header.width, 3):
         raise _damaged(file, header)
     return pixels
-
-
-def _check(
-    file: Path, colours: NDArray[Any], good: NDArray[np.bool_], expected: str, crop: Crop
-) -> None:
-    if good.all():
-        return
-    row, column, channel = np.argwhere(~good)[0]
-    raise BadInput(
-        file,
-        f"pixel value at column {crop.left + column}, row {crop.top + row}",
-        f"{colours[row, column, channel]}",
-        expected,
-    )
 
 
 def _damaged(file: Path, header: Header) -> BadInput:

@@ -3,7 +3,8 @@
 A decorrelated full-matrix factorisation, little-endian, laid out as Bonn's own btflib reads and
 writes it (github.com/cgbonn/btflib, ``read_ubo_dfmf.m``, ``read_meta_data.m``). The first part
 says whether the cosine of the light is already in the values; its mean and matrix of colours
-belong to another colour model (3, principal components) and are not used.
+belong to one colour model (3, principal components) and are used for it alone. A file may hold the
+transposed matrices: U then belongs to the pixels.
 """
 
 from __future__ import annotations
@@ -16,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.btf_factors import COLOUR_MODELS, ChannelFactors, FactoredPhotographs
+from storage.readers.btf_factors import (
+    COLOUR_MODELS,
+    ChannelFactors,
+    ColourModel,
+    FactoredPhotographs,
+)
 from storage.readers.btf_measured import MeasuredBTF, check_area, checked_crop
 
 SIGNATURES = (b"!DFMF08FCR", b"!DFMF08FC")
@@ -104,7 +110,8 @@ def open_ubo2014(path: Path, crop: tuple[int, int, int, int] | None) -> Measured
     return MeasuredBTF(
         name=path.name,
         layout="UBO2014",
-        colour=f"{_MODEL_NAMES[model]} (colour model {model}) converted to linear RGB; "
+        colour=f"{_MODEL_NAMES[model.number]} (colour model {model.number}) converted to linear "
+        f"RGB; "
         f"values are {cosine} the light's cosine",
         light=directions.light,
         view=directions.view,
@@ -131,7 +138,7 @@ def _read_signature(file: _File) -> bool:
     raise file.refuse(
         "signature",
         f"{found}, another of Bonn's formats" if other else found,
-        "!DFMF08FCR, the decorrelated full-matrix factorisation of UBO2014",
+        "!DFMF08FCR, the decorrelated full-matrix factorisation of UBO2014: btflib can write it",
     )
 
 
@@ -149,7 +156,8 @@ def _read_measurement(file: _File) -> bool:
     if version > 3:
         channels = file.integer()
         if channels != 3:
-            raise file.refuse("number of channels", str(channels), "3 (RGB)")
+            expected = "3 (RGB): write spectra as RGB"
+            raise file.refuse("number of channels", str(channels), expected)
         for _ in range(channels):
             file.skip(file.integer())
     read = file.stream.tell() - begin
@@ -167,7 +175,9 @@ def _read_directions(file: _File) -> _Directions:
         lights = _read_count(file, f"number of lights of view {index}")
         if light and lights != len(light[0]):
             raise file.refuse(
-                f"number of lights of view {index}", str(lights), f"{len(light[0])} as before"
+                f"number of lights of view {index}",
+                str(lights),
+                f"{len(light[0])} as before: the same lights for every view",
             )
         light.append(file.floats(2 * lights).reshape(lights, 2))
     lights = len(light[0])
@@ -201,14 +211,15 @@ def _on_the_hemisphere(
     return np.stack([theta, np.mod(phi, 2 * np.pi)], axis=-1)
 
 
-def _read_colour_model(file: _File) -> int:
-    (model,) = struct.unpack("<i", file.take(4))
-    file.skip(3 * 4 + 9 * 4)
-    if model not in COLOUR_MODELS:
-        name = _MODEL_NAMES.get(model, "unknown")
-        known = " or ".join(f"{key} ({_MODEL_NAMES[key]})" for key in COLOUR_MODELS)
-        raise file.refuse("colour model", f"{model} ({name})", known)
-    return int(model)
+def _read_colour_model(file: _File) -> ColourModel:
+    (number,) = struct.unpack("<i", file.take(4))
+    mean, matrix = file.floats(3), file.floats(9).reshape(3, 3)
+    if number not in COLOUR_MODELS:
+        name = _MODEL_NAMES.get(number, "unknown")
+        known = ", ".join(f"{key} ({_MODEL_NAMES[key]})" for key in COLOUR_MODELS)
+        expected = f"one of {known}: write it with one of them, btflib can"
+        raise file.refuse("colour model", f"{number} ({name})", expected)
+    return ColourModel(int(number), mean.astype(np.float32), matrix.astype(np.float32))
 
 
 def _read_channel(file: _File, channel: int, images: int, pixels: int) -> ChannelFactors:
@@ -216,8 +227,9 @@ def _read_channel(file: _File, channel: int, images: int, pixels: int) -> Channe
     if scalar_size not in _SCALARS:
         raise file.refuse(f"scalar size of channel {channel}", f"{scalar_size} bytes", "2, 4 or 8")
     components, rows, columns = file.integer(), file.integer(), file.integer()
+    transposed = (rows, columns) == (pixels, images)
     for field, found, expected in (("rows", rows, images), ("columns", columns, pixels)):
-        if found != expected:
+        if found != expected and not transposed:
             raise file.refuse(f"number of {field} of channel {channel}", str(found), str(expected))
     if not components:
         raise file.refuse(f"number of components of channel {channel}", "0", "1 or more")
@@ -225,9 +237,8 @@ def _read_channel(file: _File, channel: int, images: int, pixels: int) -> Channe
     singular_values = np.frombuffer(file.take(scalar_size * components), scalar)
     if not np.isfinite(singular_values).all():
         raise file.refuse(f"singular values of channel {channel}", "not finite", "finite values")
-    return ChannelFactors(
-        scalar=scalar.str,
-        components=components,
-        u_at=file.skip(scalar_size * components * rows),
-        sxv_at=file.skip(scalar_size * components * columns),
-    )
+    u_at = file.skip(scalar_size * components * rows)
+    sxv_at = file.skip(scalar_size * components * columns)
+    if transposed and images != pixels:
+        u_at, sxv_at = sxv_at, u_at
+    return ChannelFactors(scalar.str, components, u_at, sxv_at)

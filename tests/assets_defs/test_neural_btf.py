@@ -34,12 +34,15 @@ from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
 MATERIAL = {"material": "knit"}
 WITHOUT = MATERIAL | {"clusters": "none"}
 CLUSTERED = MATERIAL | {"clusters": "20"}
+RELIEF = {"material": "corduroy"}
+"""With more texels and directions: enough to see which way up the photographs are."""
 
 
 @pytest.fixture(scope="module")
 def good(house: Any) -> Any:
     """The house with both columns made once."""
     house.launcher.launch(Request(BTF, [WITHOUT, CLUSTERED], preset="test"))
+    assert _materialise(house, "btf_images", RELIEF, texels=32, directions=41).success
     return house
 
 
@@ -171,6 +174,10 @@ def _dark_view(right: Callable[..., Any], self: Any, view: Any) -> Any:
     return right(self, view) * (view[0] > 0)
 
 
+def _mirrored_view(right: Callable[..., Any], self: Any, view: Any) -> Any:
+    return right(self, view)[:, :, ::-1]
+
+
 def _shifted_texels(right: Callable[..., Any], images: Any) -> Any:
     return right(images[:, ::-1])
 
@@ -241,6 +248,13 @@ REGRESSIONS = (
         "photographs",
         lambda right, self, view: right(self, view) * 1.1,
         MATERIAL,
+    ),
+    Regression(
+        "orientation_margin",
+        gonioreflectometer.Gonioreflectometer,
+        "photographs",
+        _mirrored_view,
+        RELIEF,
     ),
     Regression("transposition_error", datasets, "transposed_view", _shifted_texels, MATERIAL),
     Regression("statistics_error", principal_abrdfs, "image_statistics", _wide_deviation, MATERIAL),

@@ -38,7 +38,7 @@ def matt(slope: NDArray[np.float64]) -> NDArray[np.float32]:
 
 @pytest.fixture(scope="module")
 def cloth() -> Photographed:
-    return photographed("twill", texels=32)
+    return photographed("corduroy", texels=32)
 
 
 def test_every_orientation_of_a_cloth_is_found(cloth: Photographed) -> None:

@@ -289,7 +289,6 @@ def test_all_6561_headers_are_read(tmp_path: Path) -> None:
 
 # --- What is refused before any work ------------------------------------------------------------
 
-GREY = codes()[0][..., :1]
 XYZ = hdr_light().astype(np.float16)[0]
 RGBE = rgbe_of(hdr_light()[0])
 
@@ -306,13 +305,8 @@ def jpeg_of_mode(mode: str) -> bytes:
 
 ALPHA = np.dstack([codes()[0], codes()[0][..., :1]])
 NOT_A_DATABASE: list[tuple[str, bytes, str]] = [
-    ("png", png_bytes(codes()[0].astype(np.uint16)), "pixel format is 16-bit RGB; expected 8-bit"),
-    ("png", png_bytes(GREY, 0), "pixel format is 8-bit grey; expected 8-bit RGB"),
-    ("png", png_bytes(ALPHA, 6), "pixel format is 8-bit RGB with alpha; expected 8-bit RGB"),
-    ("png", png_bytes(codes()[0], 2, (b"tRNS", bytes(6))), "8-bit RGB with transparency"),
-    ("png", png_bytes(codes()[0], 2, (b"iCCP", bytes(5000)), (b"tRNS", bytes(6))), "transparency"),
-    ("jpg", jpeg_of_mode("L"), "pixel format is 8-bit grey; expected 8-bit RGB"),
-    ("jpg", jpeg_of_mode("CMYK"), "pixel format is 8-bit CMYK"),
+    ("png", png_bytes(ALPHA, 6), "alpha channel is not opaque at 100.0% of the pixels"),
+    ("jpg", jpeg_of_mode("CMYK"), "pixel format is 8-bit CMYK; expected 8-bit grey or RGB"),
     ("png", b"GIF89a" + bytes(60), "format is unknown; expected a JPEG, PNG, EXR or Radiance"),
     ("png", b"", "format is unknown (the file is empty)"),
     ("png", png_bytes(codes()[0])[:20], "content is truncated or damaged"),
@@ -320,11 +314,10 @@ NOT_A_DATABASE: list[tuple[str, bytes, str]] = [
     ("jpg", jpeg_bytes(codes()[0])[:100], "content is truncated or damaged"),
     ("jpg", b"\xff\xd8\xff\xd9" + bytes(60), "content is truncated or damaged"),
     ("exr", exr(XYZ)[:200], "content is truncated or damaged"),
-    ("exr", exr(XYZ, "XYA"), "channels is A, X, Y; expected X, Y, Z or R, G, B alone"),
-    ("exr", exr(np.dstack([XYZ, XYZ[..., :1]]), "RGBA"), "channels is A, B, G, R"),
+    ("exr", exr(XYZ, "XYA"), "channels is A, X, Y; expected R, G, B or X, Y, Z"),
     ("exr", exr(XYZ.astype(np.uint32)), "unsigned; expected half or float channels"),
-    ("exr", exr(XYZ, "RGB", chromaticities=(0.7, 0.3, 0, 1, 0, 0, 0.3, 0.3)), "chromaticities is"),
-    ("hdr", hdr_bytes(RGBE, lines=["FORMAT=32-bit_rle_xyze"]), "FORMAT is 32-bit_rle_xyze"),
+    ("exr", exr(XYZ, "RGB", chromaticities=(0.7, 0.3, 0.7, 0.3, 0, 0, 0.3, 0.3)), "exr_colours"),
+    ("hdr", hdr_bytes(RGBE, lines=["FORMAT=32-bit_rle_luv"]), "FORMAT is 32-bit_rle_luv"),
     ("hdr", b"#?RADIANCE\n\n-Y 6 -Y 9\n", "resolution line is '-Y 6 -Y 9'"),
     ("hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n", "content is truncated or damaged"),
 ]  # fmt: skip
@@ -354,7 +347,6 @@ def test_an_image_of_far_too_many_pixels(tmp_path: Path) -> None:
     [
         (png_bytes(codes()[0][:-1]), "size is 9 x 7 pixels; expected 9 x 8 pixels as in"),
         (jpeg_bytes(codes()[0]), "format is JPEG; expected PNG as in the other files"),
-        (png_bytes(codes()[0].astype(np.uint16)), "pixel format is 16-bit RGB; expected 8-bit RGB"),
     ],
 )
 def test_the_file_that_differs_is_named(tmp_path: Path, data: bytes, reason: str) -> None:
@@ -364,12 +356,20 @@ def test_the_file_that_differs_is_named(tmp_path: Path, data: bytes, reason: str
     assert reason in refusal(lambda: open_btf(path), os.path.basename(first))
 
 
-def test_half_and_float_do_not_mix(tmp_path: Path) -> None:
+def test_half_and_float_may_mix(tmp_path: Path) -> None:
     files = exr_files(hdr_light().astype(np.float16))
     name = list(files)[3]
     path = write_zip(tmp_path / "wood.zip", files | {name: exr(XYZ.astype(np.float32))})
+    light = whole(open_btf(path))
+    np.testing.assert_allclose(light[3], light[0], rtol=1e-5, atol=1e-5)
+
+
+def test_files_in_cie_xyz_and_in_rgb_do_not_mix(tmp_path: Path) -> None:
+    files = exr_files(hdr_light().astype(np.float16))
+    name = list(files)[3]
+    path = write_zip(tmp_path / "wood.zip", files | {name: exr(XYZ, "RGB")})
     text = refusal(lambda: open_btf(path), os.path.basename(name))
-    assert "pixel format is float CIE XYZ; expected half CIE XYZ as in the other files" in text
+    assert "colour is R, G, B; expected X, Y, Z" in text
 
 
 def test_paths_that_are_no_database(tmp_path: Path) -> None:
@@ -384,8 +384,10 @@ def test_paths_that_are_no_database(tmp_path: Path) -> None:
     assert "without photographs" in refusal(lambda: open_btf(tmp_path / "doc.zip"), "doc.zip")
     (tmp_path / "bare").mkdir()
     assert "without photographs" in refusal(lambda: open_btf(tmp_path / "bare"), "bare")
-    write_zip(tmp_path / "film.zip", png_files() | {"film.mp4": b"film"})
-    assert "without angles" in refusal(lambda: open_btf(tmp_path / "film.zip"), "film.mp4")
+    (tmp_path / "wool.rar").write_bytes(b"Rar!\x1a\x07\x00" + bytes(50))
+    text = refusal(lambda: open_btf(tmp_path / "wool.rar"), "wool.rar")
+    assert "format is a RAR archive" in text
+    assert "unpack it to a folder" in text
 
 
 def test_truncated_zips_are_refused_wherever_they_end(tmp_path: Path) -> None:
@@ -476,7 +478,6 @@ def test_a_jpeg_with_bytes_behind_its_end(tmp_path: Path) -> None:
     [
         ("XYZ", np.nan, "nan; expected a finite value"),
         ("RGB", -np.inf, "-inf; expected a finite value"),
-        ("XYZ", -0.25, "-0.25; expected 0 or more"),
     ],
 )
 def test_values_that_no_light_has(tmp_path: Path, names: str, value: float, expected: str) -> None:
@@ -493,7 +494,8 @@ def test_values_that_no_light_has(tmp_path: Path, names: str, value: float, expe
 def test_negative_rgb_is_kept(tmp_path: Path) -> None:
     images = hdr_light().astype(np.float16)
     images[0, 0, 0, 0] = -0.25
-    light = whole(open_btf(write_zip(tmp_path / "wood.zip", exr_files(images, "RGB"))))
+    path = write_zip(tmp_path / "wood.zip", exr_files(images, "RGB"))
+    light = whole(open_btf(path, exr_colours="rgb"))
     assert light[0, 0, 0, 0] == -0.25
 
 
