@@ -137,10 +137,10 @@ def composed(
     return matrices
 
 
-def instance_count(document: dict[str, Any], accessors: Accessors, node: int) -> int:
-    """How often a node places its mesh."""
-    attributes = _instancing(document, node)
-    return min((accessors.count(row) for row in attributes.values()), default=1)
+def instance_counts(document: dict[str, Any], accessors: Accessors, node: int) -> list[int]:
+    """How many elements the attributes of a node's instances have: as many as there are instances,
+    each. None where the node places its mesh once, without any."""
+    return [accessors.count(row) for row in _instancing(document, node).values()]
 
 
 def placements(
@@ -150,7 +150,7 @@ def placements(
     attributes = _instancing(document, node)
     if not attributes:
         return world[node][None]
-    count = instance_count(document, accessors, node)
+    count = min(instance_counts(document, accessors, node))
 
     def values(name: str, width: int, default: float) -> NDArray[np.float64]:
         if name not in attributes:

@@ -7,12 +7,13 @@ from typing import Any
 from storage.readers.gltf.accessors import Accessors
 from storage.readers.gltf.document import DRACO, MESHOPT
 from storage.readers.gltf.primitives import FAN, STRIP, is_surface, joint_sets, uv_sets
-from storage.readers.gltf.scene_tree import Group, instance_count
+from storage.readers.gltf.scene_tree import Group, instance_counts
 from storage.readers.opening import check_memory
 
 _VERTEX_BYTES, _CORNER_BYTES = 80, 110  # of what is placed, measured up to its triangles
 _SET_BYTES = 64  # of each corner's texture coordinates, or colour
-_READ_BYTES = 64  # of each vertex, for each morph target and each set of joints
+_READ_BYTES = 64  # of each element of an accessor of up to four numbers
+_MATRIX_BYTES = 400
 _PRIMITIVE_BYTES = 20_000  # it takes a fifth of a millisecond; what is many takes memory, too
 _INSTANCE_BYTES = 500
 _MEMORY_PER_BYTE = 64  # plain files take 40 at most
@@ -30,14 +31,24 @@ def check_sizes(document: dict[str, Any], accessors: Accessors, groups: list[Gro
     needed = sum(2 * view["count"] * view["byteStride"] for view in packed)
     corners = instances = 0
     sets: set[int] = set()
+    for skin in {group.skin for group in groups if group.skin is not None}:
+        entry = document["skins"][skin]
+        needed += _MATRIX_BYTES * len(entry["joints"])
+        if "inverseBindMatrices" in entry:
+            needed += _MATRIX_BYTES * accessors.count(entry["inverseBindMatrices"])
     for group in groups:
-        places = sum(instance_count(document, accessors, node) for node in group.nodes)
+        places = 0
+        for node in group.nodes:
+            counts = instance_counts(document, accessors, node)
+            places += min(counts, default=1)
+            needed += _READ_BYTES * sum(counts)
         places = 1 if group.skin is not None else places
         instances += places
         for primitive in document["meshes"][group.mesh]["primitives"]:
             if is_surface(primitive):
                 vertices, its_corners = _size(primitive, accessors)
-                needed += _PRIMITIVE_BYTES + _reading(primitive, vertices, group)
+                read = sum(map(accessors.count, _read(primitive, group)))
+                needed += _PRIMITIVE_BYTES + _READ_BYTES * read
                 needed += (places + 1) * _VERTEX_BYTES * vertices
                 needed += (places + 1) * _CORNER_BYTES * its_corners
                 corners += places * its_corners
@@ -60,9 +71,14 @@ def _size(primitive: dict[str, Any], accessors: Accessors) -> tuple[int, int]:
     return vertices, corners
 
 
-def _reading(primitive: dict[str, Any], vertices: int, group: Group) -> int:
-    """Bytes that are read and summed up before anything is placed."""
-    targets = zip(primitive.get("targets", ()), group.weights, strict=False)
-    active = sum(len(target) for target, weight in targets if weight)
-    joints = len(joint_sets(primitive)) if group.skin is not None else 0
-    return _READ_BYTES * vertices * (active + 4 * joints + len(uv_sets(primitive)))
+def _read(primitive: dict[str, Any], group: Group) -> list[int]:
+    """The accessors of a primitive that are read."""
+    attributes = primitive["attributes"]
+    names = ["POSITION", "COLOR_0", *(f"TEXCOORD_{number}" for number in uv_sets(primitive))]
+    if group.skin is not None:
+        for number in joint_sets(primitive):
+            names += [f"JOINTS_{number}", f"WEIGHTS_{number}"]
+    read = [attributes[name] for name in names if name in attributes]
+    for target, weight in zip(primitive.get("targets", ()), group.weights, strict=False):
+        read += [target[name] for name in names if weight and name in target]
+    return read
