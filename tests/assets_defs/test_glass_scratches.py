@@ -137,6 +137,10 @@ def _deeper(right: Callable[..., Any], *arguments: Any) -> Any:
     return right(*arguments) * [1.0, 1.1]
 
 
+def _nanometres_as_micrometres(right: Callable[..., Any], *arguments: Any) -> Any:
+    return right(*arguments) * [1.0, 1000.0]
+
+
 def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
     return right(*arguments) + np.array([0.0, 0.1])
 
@@ -211,6 +215,7 @@ def _furnace_times(factor: float) -> Callable[..., Any]:
 
 REGRESSIONS = (
     Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
+    Regression("aspect", profiles, "cut_profile", _nanometres_as_micrometres, SETTING),
     Regression("opening_tilt", profiles, "cut_profile", _raised, SETTING),
     Regression("furnace_error", tables, "solve_radiosity", _brighter_table, SETTING),
     Regression("reciprocity_error", tables, "solve_radiosity", _one_sided, SETTING),
@@ -298,7 +303,7 @@ def test_bad_settings_are_refused_before_any_work(
     ("name", "content", "sentence"),
     [
         ("loop.csv", "v,n\n-5,0\n3,-4\n-3,-4\n5,0\n", r"loop\.csv: the profile crosses itself"),
-        ("nan.csv", "v,n\n-5,0\n0,nan\n5,0\n", r"nan\.csv: .*nan"),
+        ("nan.csv", "v,n\n-5,0\n0,nan\n5,0\n", r"nan\.csv: .*1 more without a height"),
         ("hang.csv", "v,n\n0,0\n-3,-2\n2,-4\n5,0\n", r"hang\.csv: the profile runs back under"),
         (
             "open.obj",

@@ -21,6 +21,7 @@ FLATTEST, DEEPEST = 1e-3, 20.0
 
 _MOST_POINTS = 1024  # the exact table takes their third power: half a second
 _MOST_MISSING = 0.1  # of the opening
+_MOST_TILT = 0.1  # of the depth, across the scratch, before it is worth a word
 _MAD = 1.4826  # deviation of a normal distribution over its median absolute deviation
 _CREST = 5.0  # deviations above the land that roughness does not reach
 _REACHED = 0.005  # of the depth: a groove's edge may be as soft
@@ -61,6 +62,22 @@ def measured_profile(scan: Floats, gaps: Floats, name: str, *, level: bool = Fal
             f"{tolerance:.2g} µm."
         )
     points = cut_profile(kept, name)
+    _check_scratch(points, kept, gaps, name)
+    if last - first + 1 < len(scan) and not level:
+        line = land_line(scan)
+        tilt, depth = abs(line[last] - line[first]), -points[:, 1].min()
+        if tilt > _MOST_TILT * depth:
+            notes.append(
+                f"The land rises by {tilt:.3g} µm across a scratch of {depth:.3g} µm: the setting "
+                "level removes such a tilt."
+            )
+    return Measured(points, tuple(notes))
+
+
+def _check_scratch(points: Floats, kept: Floats, gaps: Floats, name: str) -> None:
+    """Raise ValueError for a scratch with missing heights, or of a shape that none has.
+
+    ``points`` is what was cut out of ``kept``, moved."""
     width, depth = points[-1, 0] - points[0, 0], -points[:, 1].min()
     moved = kept[np.argmin(kept[:, 1]), 0] - points[np.argmin(points[:, 1]), 0]
     inside = np.clip(np.sort(gaps, axis=1) - moved, points[0, 0], points[-1, 0])
@@ -75,7 +92,6 @@ def measured_profile(scan: Floats, gaps: Floats, name: str, *, level: bool = Fal
             f"{name}: the scratch is {width:.3g} µm wide and {depth:.3g} µm deep; expected a depth "
             f"of {FLATTEST:g} to {DEEPEST:g} widths: name the units in the header, v [um], n [nm]."
         )
-    return Measured(points, tuple(notes))
 
 
 def land_line(scan: Floats) -> Floats:
