@@ -17,9 +17,9 @@ from assets_defs.street_billboards.capture_datasets import (
     stacked_by_frame,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.street_billboards import figures
-from storage.readers.drives import Drive, read_drive, read_frame
+from storage.readers.drives import Drive, frame_notes, read_drive, read_frame
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
@@ -161,7 +161,9 @@ def _taken_in(drive: Drive, settings: DriveSettings, name: str) -> Result:
     origin = np.round(poses[0, 0, :3, 3])
     poses[..., :3, 3] -= origin
     dataset = drive_dataset(photographs, np.stack(intrinsics), poses, origin, held_out(len(chosen)))
-    return dataset, {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
+    notes = [f"As of all its photographs: {note}" for note in frame_notes(drive, chosen[0])]
+    shown = {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
+    return dataset, {**shown, NOTES: notes}
 
 
 def _simulated(settings: DriveSettings, progress: Progress) -> Result:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from itertools import combinations
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown
 from storage.readers.image_decoding import decode_image
 from storage.readers.opening import check_file, check_memory, first_bytes
 from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
+from storage.readers.pillow_pictures import opened
 
 FEWEST_CAMERAS = 2
 MOST_CAMERAS = 500
@@ -39,7 +40,7 @@ LARGEST_GAP = 20
 """The longest step from an instant to the next, in medians of all steps."""
 
 _STANDING = 0.01  # metres a step: a car that waits has no say in the median
-_PHOTOGRAPH = "a PNG or JPEG photograph"
+_PHOTOGRAPH = "a PNG, JPEG, WebP, AVIF or BMP photograph"
 
 
 class Drive(NamedTuple):
@@ -77,7 +78,7 @@ def read_drive(path: str | PathLike[str]) -> Drive:
     changes, and cameras whose pictures differ in size; for cameras less than 1 mm apart, or whose
     distance changes by more than 5 %; for a car that stays within 0.1 m or a baseline of its first
     place; for a step of more than 20 times the median of the steps (those without motion left
-    out); and for a photograph that is missing, no PNG or JPEG, to be turned, or of another size
+    out); and for a photograph that is missing, of another format, to be turned, or of another size
     than `w` and `h` say.
     """
     file, frames = read_transforms(path)
@@ -127,6 +128,15 @@ def read_frame(drive: Drive, frame: int) -> NDArray[np.uint8]:
     for picture, file, lens in zip(pictures, drive.files[frame], lenses, strict=True):
         picture[:] = _picture(file, drive.width, drive.height, *lens)
     return pictures
+
+
+def frame_notes(drive: Drive, frame: int) -> tuple[str, ...]:
+    """What is to be said of how the photographs of one instant were read, each sentence once.
+
+    Raises BadInput as :func:`decode_image` does; IndexError for an instant that is not there.
+    """
+    said = (note for file in drive.files[frame] for note in decode_image(file).notes)
+    return tuple(dict.fromkeys(said))
 
 
 def _instants(file: Path, frames: Sequence[Frame]) -> list[dict[str, Frame]]:
@@ -241,21 +251,31 @@ def _check_way(file: Path, times: NDArray[np.float64], places: NDArray[np.float6
 
 
 def _check_header(file: Path, width: int, height: int) -> None:
-    # Imported when needed, as in the module that decodes.
-    from PIL import JpegImagePlugin, PngImagePlugin
+    # Imported when needed, as in the modules that decode.
+    from PIL import (
+        AvifImagePlugin,
+        BmpImagePlugin,
+        JpegImagePlugin,
+        PngImagePlugin,
+        WebPImagePlugin,
+    )
 
+    plugins: tuple[tuple[int, bytes, Any], ...] = (
+        (0, b"\x89PNG\r\n\x1a\n", PngImagePlugin.PngImageFile),
+        (0, b"\xff\xd8\xff", JpegImagePlugin.JpegImageFile),
+        (8, b"WEBP", WebPImagePlugin.WebPImageFile),
+        (4, b"ftypavi", AvifImagePlugin.AvifImageFile),
+        (0, b"BM", BmpImagePlugin.BmpImageFile),
+    )
     try:
-        start = first_bytes(file, 8, _PHOTOGRAPH, LARGEST_PICTURE, field="photograph")
+        start = first_bytes(file, 16, _PHOTOGRAPH, LARGEST_PICTURE, field="photograph")
+        found = [plugin for at, begins, plugin in plugins if start.startswith(begins, at)]
+        if not found:
+            raise BadInput(file, "format", "unknown" if start else "empty", _PHOTOGRAPH)
         with file.open("rb") as stream:
-            image: PngImagePlugin.PngImageFile | JpegImagePlugin.JpegImageFile
-            if start.startswith(b"\x89PNG\r\n\x1a\n"):
-                image = PngImagePlugin.PngImageFile(stream)
-            elif start.startswith(b"\xff\xd8\xff"):
-                image = JpegImagePlugin.JpegImageFile(stream)
-            else:
-                raise BadInput(file, "format", "unknown" if start else "empty", _PHOTOGRAPH)
+            image = opened(found[0], stream)
             # Asked of a PNG without EXIF before its pixels, Pillow would decode it.
-            tags = image.getexif() if image.format == "JPEG" or "exif" in image.info else {}
+            tags = image.getexif() if image.format != "PNG" or "exif" in image.info else {}
             orientation = tags.get(0x0112, 1)
     except BadInput:
         raise
@@ -292,7 +312,8 @@ def _picture(
     _check_size(file, codes.shape[1], codes.shape[0], width, height)
     if image.opaque is not None and not image.opaque.all():
         holes = image.opaque.size - np.count_nonzero(image.opaque)
-        raise BadInput(file, "alpha", f"less than opaque in {holes} pixel(s)", "an opaque picture")
+        found = f"less than opaque in {holes} pixel(s)"
+        raise BadInput(file, "alpha", found, "an opaque picture; save it without its alpha channel")
     if codes.dtype.kind == "f":  # colours with a profile other than sRGB's
         codes = np.rint(65535 * srgb_of_light(codes)).astype(np.uint16)
     if distortion.any():

@@ -173,7 +173,7 @@ def _percent(share: float) -> str:
 
 def _linear_light(colours: NDArray[Any]) -> NDArray[np.float32]:
     if colours.dtype.kind == "f":
-        with np.errstate(over="ignore"):  # a double beyond float32 becomes inf and is refused
+        with np.errstate(over="ignore", invalid="ignore"):  # a double becomes infinite
             return colours.astype(np.float32)
     codes = np.arange(np.iinfo(colours.dtype).max + 1)
     light: NDArray[np.float32] = light_of_srgb(codes / codes[-1]).astype(np.float32)[colours]

@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
 from storage.readers import BadInput
-from storage.readers.drives import read_drive, read_frame
+from storage.readers.drives import frame_notes, read_drive, read_frame
 
 WIDTH, HEIGHT = 32, 24
 LENS = {"fl_x": 30.0, "fl_y": 31.0, "cx": 15.5, "cy": 12.25, "w": WIDTH, "h": HEIGHT}
@@ -242,10 +242,31 @@ def test_kinds_of_photographs(tmp_path: Path) -> None:
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     smooth = np.stack([4 * x + 50, 6 * y + 60, 200 - 3 * x], axis=-1).astype(np.uint8)
     Image.fromarray(smooth).save(folder / "right_0.png", format="JPEG", quality=98, subsampling=0)
-    pictures = read_frame(read_drive(folder), 0)
+    drive = read_drive(folder)
+    pictures = read_frame(drive, 0)
     np.testing.assert_array_equal(pictures[0], np.round(deep / 65535 * 255))
     np.testing.assert_array_equal(pictures[1], np.repeat(grey[..., None], 3, axis=2))
     assert np.abs(pictures[2].astype(int) - smooth).max() < 6
+    assert frame_notes(drive, 0) == ()
+
+
+def test_other_formats_and_colours_of_photographs(tmp_path: Path) -> None:
+    """WebP and BMP keep the codes; a gamma of 1 is turned into sRGB's curve, and said."""
+    folder = write_drive(tmp_path / "street")
+    plain = picture(51)
+    Image.fromarray(plain).save(folder / "left_0.png", format="WEBP", lossless=True)
+    Image.fromarray(plain).save(folder / "middle_0.png", format="BMP")
+    linear = PngImagePlugin.PngInfo()
+    linear.add(b"gAMA", (100_000).to_bytes(4, "big"))
+    Image.fromarray(plain).save(folder / "right_0.png", pnginfo=linear)
+    drive = read_drive(folder)
+    pictures = read_frame(drive, 0)
+    np.testing.assert_array_equal(pictures[0], plain)
+    np.testing.assert_array_equal(pictures[1], plain)
+    light = plain / 255
+    curved = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    assert np.abs(pictures[2] - 255 * curved).max() <= 0.51
+    assert frame_notes(drive, 0) == ("The colours were converted to sRGB from the gamma 1.",)
 
 
 @pytest.mark.parametrize("mode", ["8 bit", "16 bit", "grey"])
@@ -506,7 +527,10 @@ def test_missing_and_wrong_photographs(tmp_path: Path) -> None:
     for content, part in (
         (b"", "format is empty"),
         (b"GIF89a", "format is unknown"),
-        (b"II*\0" + bytes(200), "format is unknown; expected a PNG or JPEG photograph"),
+        (
+            b"II*\0" + bytes(200),
+            "format is unknown; expected a PNG, JPEG, WebP, AVIF or BMP photograph",
+        ),
         (good[:20], "content is truncated or damaged"),
         (b"\xff\xd8\xff\xe0", "content is truncated or damaged"),
     ):
