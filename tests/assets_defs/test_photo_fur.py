@@ -130,6 +130,11 @@ def _stretched_teapot(right: Callable[..., Any], segments: int) -> Any:
     return Mesh(mesh.vertices, mesh.triangles, mesh.uvs * [8.0, 1.0], mesh.normals)
 
 
+def _inside_out_teapot(right: Callable[..., Any], segments: int) -> Any:
+    mesh = right(segments)
+    return Mesh(mesh.vertices, mesh.triangles[:, ::-1], mesh.uvs, -mesh.normals)
+
+
 def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     pelt = right(*arguments, **options)
     pixels = pelt.radiance.reshape(-1, 3)
@@ -173,6 +178,7 @@ REGRESSIONS = (
         KEYS,
     ),
     Regression("texture_stretch", shapes, "teapot", _stretched_teapot, PELT_KEYS),
+    Regression("outward_share", shapes, "teapot", _inside_out_teapot, PELT_KEYS),
     Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
     Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),
     Regression(
@@ -202,7 +208,8 @@ def test_a_step_inside_the_bound_is_a_regression_too(
     store = good.workspace.store
     slot = Slot("photo_fur", "fur_frames", "teapot.pelt")
     before = store.current(slot)
-    monkeypatch.setattr(frames, "BACKGROUND", (0.2, 0.2, 0.2))
+    right = frames.to_8bit
+    monkeypatch.setattr(frames, "to_8bit", lambda picture: right(picture * 0.9))
     with pytest.raises(LaunchError, match="last good version"):
         good.launcher.launch(Request(FUR, [PELT_KEYS], force=True))
     assert store.current(slot) == before

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +21,7 @@ from pipelines.photo_fur.figures import (
     interval_error,
     kept_share,
     mean_brightness,
+    outward_share,
     partition_error,
     step_error,
     top_view_rmse,
@@ -162,7 +164,38 @@ def test_a_picture_of_several_pixels_a_texel_is_compared_with_each() -> None:
     assert top_view_rmse(picture, radiance) > 0.0
 
 
-def test_mean_brightness_is_the_mean_of_the_codes() -> None:
+def test_mean_brightness_is_that_of_the_fur_alone() -> None:
     pictures = np.random.default_rng(17).integers(0, 256, (3, 40, 30, 3), dtype=np.uint8)
+    background = np.array([94, 97, 104], np.uint8)
     expected = sum(pictures.ravel().tolist()) / pictures.size / 255
-    assert mean_brightness(pictures) == pytest.approx(expected, rel=1e-12)
+    assert mean_brightness(pictures, background) == pytest.approx(expected, rel=1e-12)
+    around = np.tile(background, (3, 60, 90, 1))
+    around[:, 10:50, 20:50] = pictures
+    assert mean_brightness(around, background) == pytest.approx(expected, rel=1e-12)
+    assert mean_brightness(np.tile(background, (2, 9, 9, 1)), background) == 0
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("name", "kept", "least", "most"),
+    [
+        ("ball", 320, 0.999, 1.0),
+        ("ball with a hole", 316, 0.98, 1.0),
+        ("half a ball", 160, 0.55, 0.95),
+        ("sheet", 2, 0.45, 0.55),
+    ],
+)
+def test_outward_share(name: str, kept: int, least: float, most: float, size: float) -> None:
+    """Hair along the normals of balls and sheets, and against them: the null."""
+    ball = trimesh.creation.icosphere(2)
+    points = np.array(ball.vertices)
+    faces = np.array(ball.faces)[np.argsort(points[ball.faces][:, :, 2].mean(axis=1))][:kept]
+    normals = points.copy()
+    if name == "sheet":
+        points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+        faces, normals = np.array([[0, 1, 2], [0, 2, 3]]), np.tile([0.0, 0.0, 1.0], (4, 1))
+    place = np.array([3.0, -8.0, 5.0]) * size
+    for sign in (1, -1):
+        shells = place + size * np.stack([points + h * sign * normals for h in (0.06, 0.03, 0)])
+        share = outward_share(shells.astype(np.float32), faces)
+        assert least <= (share if sign > 0 else 1 - share) <= most
