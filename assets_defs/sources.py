@@ -230,6 +230,8 @@ def _item(
         referred = {companion for path in inside for companion in companions(path)}
         own = [path for path in inside if path.name == entry.name]
         inside = own or [path for path in inside if Path(os.path.abspath(path)) not in referred]
+    if len(inside) > 1:  # a profile may end in .txt, and so does the licence beside a model
+        inside = [path for path in inside if path.suffix.lower() != ".txt"] or inside
     if len(inside) == 1:
         return str(_dimension_of(inside[0], endings)), inside[0]
     for dimension in folders:

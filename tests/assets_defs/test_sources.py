@@ -156,6 +156,17 @@ def test_oddities_are_told_alone_and_stop_nothing(
     assert ".webp; expected one of .png, .jpg, .obj, .ply" in found.oddities["fur.webp"]
 
 
+def test_a_licence_beside_a_model_is_no_item_where_text_files_are(tmp_path: Path) -> None:
+    endings = {"setting": (".csv", ".txt"), "object": (".obj",)}
+    _write(tmp_path / "vase" / "licence.txt", "free")
+    _write(tmp_path / "vase" / "vase.obj", "v 0 0 0\n")
+    _write(tmp_path / "groove" / "groove.txt", "0 0\n")
+    found = look_into(tmp_path, endings, ())
+    assert found.items["object"] == [tmp_path / "vase" / "vase.obj"]
+    assert found.items["setting"] == [tmp_path / "groove" / "groove.txt"]
+    assert not found.oddities
+
+
 def test_an_inbox_that_is_itself_a_link_holds_its_items(tmp_path: Path) -> None:
     _write(tmp_path / "big disk" / "fur.png")
     (tmp_path / "big disk" / "alias.png").symlink_to(tmp_path / "big disk" / "fur.png")
