@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import json
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +47,7 @@ def valid_cases() -> list[Case]:
     }
     return [
         *(Case(name, "photograph", name, {name: data}) for name, data in encoded.items()),
+        *_photographs_people_have(),
         *(Case(name, "environment", name, {name: data}) for name, data in lights.items()),
         *(Case(name, "mesh", name, {name: data}) for name, data in meshes.items()),
         *(Case(name, "scene", name, {name: data, **library}) for name, data in meshes.items()),
@@ -53,6 +56,20 @@ def valid_cases() -> list[Case]:
         drive("png"),
         drive("jpg"),
     ]
+
+
+def _photographs_people_have() -> list[Case]:
+    """One of each kind of ``benchmarks.captures.photographs`` that is read."""
+    from benchmarks.captures.case import write_file
+    from benchmarks.captures.photographs import CASES
+
+    kinds = {case.kind: case for case in CASES if case.ends != "refused" and case.write}
+    with tempfile.TemporaryDirectory() as folder:
+        written = [write_file(case, Path(folder)) for case in kinds.values()]
+        return [
+            Case(path.name, "photograph", path.name, {path.name: path.read_bytes()})
+            for path in written
+        ]
 
 
 def glb(description: Any, body: bytes) -> bytes:

@@ -5,6 +5,7 @@ Pillow reads what tifffile does not: luminance with subsampled colour, and fax c
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -96,6 +97,10 @@ def _check_complete(file: Path, tiff: tifffile.TiffFile, page: tifffile.TiffPage
     tiff.filehandle.seek(page.offset)
     announced = struct.unpack(tiff.tiff.tagnoformat, tiff.filehandle.read(tiff.tiff.tagnosize))[0]
     complete = max(ends) <= file.stat().st_size and len(page.tags) == announced
+    if page.is_contiguous:
+        complete &= sum(page.databytecounts) >= page.nbytes
+    else:
+        complete &= len(ends) >= math.prod(page.chunked)
     if not complete or min(page.databytecounts) == 0:
         raise damaged(file, "TIFF")
 

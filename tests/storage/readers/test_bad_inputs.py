@@ -16,6 +16,7 @@ from storage.readers.bad_input import MOST_QUOTED
 
 NAMED = named_cases()
 READ_NONETHELESS = {
+    ("broken EXIF", "photograph"),
     ("cap.obj", "mesh"),
     ("cap.obj", "scene"),
     ("repeated.obj", "scene"),
