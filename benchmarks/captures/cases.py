@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from benchmarks.captures import gltf, light_probes, materials, photographs, profiles
+from benchmarks.captures import gltf, light_probes, materials, meshes, photographs, profiles
 from benchmarks.captures.case import Case
 
 CASES: dict[str, tuple[Case, ...]] = {
     "gltf": gltf.CASES,
     "light_probes": light_probes.CASES,
     "materials": materials.CASES,
+    "meshes": meshes.CASES,
     "photographs": photographs.CASES,
     "profiles": profiles.CASES,
 }

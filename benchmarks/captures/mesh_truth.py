@@ -14,13 +14,21 @@ from pipelines.geometry.solids import make_closed_mesh
 from storage.readers.bad_input import BadInput
 from storage.readers.meshes import read_mesh
 
-SOLID = np.array([[0, 0, 0], [2, 0, 0], [0.5, 0.25, 3], [2, 1, 0], [0, 1, 0], [1.5, 0.75, 2]])
-"""Corners of a hull of a rectangle and two points above it."""
+SOLID = np.array(
+    [
+        *([0, 0, 0], [2, 0, 0], [0.5, 0.25, 3], [2, 1, 0]),
+        *([0, 1, 0], [1.5, 0.75, 2], [1.75, 2, 1]),
+    ]
+)
+"""Corners: a rectangle, two points above it, and one beside these."""
 SIDES = np.array(
-    [[0, 3, 1], [0, 4, 3], [0, 1, 2], [1, 5, 2], [1, 3, 5], [3, 4, 5], [4, 2, 5], [4, 0, 2]]
+    [
+        *([0, 3, 1], [0, 4, 3], [0, 1, 2], [1, 5, 2], [1, 3, 5]),
+        *([3, 4, 6], [4, 5, 6], [5, 3, 6], [4, 2, 5], [4, 0, 2]),
+    ]
 )
 """Its triangles, counter-clockwise from outside; the first two are the rectangle."""
-UVS = np.array([[0, 0], [1, 0], [0.25, 0.5], [1, 1], [0, 1], [0.75, 0.5]])
+UVS = np.array([[0, 0], [1, 0], [0.25, 0.5], [1, 1], [0, 1], [0.75, 0.5], [0.5, 0.75]])
 
 
 class Furred(NamedTuple):

@@ -1,0 +1,393 @@
+"""Meshes as PLY files, written byte by byte."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.captures.case import FILES, Case, Ending
+from benchmarks.captures.mesh_truth import (
+    SIDES,
+    SOLID,
+    UVS,
+    has_triangles,
+    packed,
+    ply_head,
+    read_for_fur,
+    rows_of,
+    text,
+)
+from storage.readers.meshes import read_mesh, read_polygons
+
+_XYZ = ("float x", "float y", "float z")
+_RGB = ("uchar red", "uchar green", "uchar blue")
+_LISTS = ("list uchar int vertex_indices",)
+_SOLID = has_triangles(SOLID, SIDES)
+_CODES = np.array(
+    [
+        [200, 10, 0],
+        [0, 255, 30],
+        [7, 0, 128],
+        [255, 255, 255],
+        [90, 60, 0],
+        [1, 2, 3],
+        [50, 50, 200],
+    ]
+)
+_FACES = rows_of(np.full(10, 3), SIDES)
+_HEAD = ply_head("ascii", _XYZ, _LISTS, (7, 10))
+_BODY = "end_header\n" + rows_of(SOLID) + _FACES
+
+
+class _Polygons:
+    """A mesh before it is cut: its corners' colours are not lost yet."""
+
+    def __init__(self, path: Path) -> None:
+        self.mesh = read_polygons(path)
+        self.notes = self.mesh.notes
+
+
+def _case(
+    name: str,
+    kind: str,
+    write: Callable[[Path], object] | None,
+    ends: Ending = "read",
+    says: Sequence[str] = (),
+    is_right: Callable[[Any], bool] | None = _SOLID,
+    read: Callable[[Path], Any] = read_mesh,
+) -> Case:
+    return Case(name, kind, read, ends, says, is_right if ends != "refused" else None, write)
+
+
+def _linear(codes: NDArray[np.floating]) -> NDArray[np.float64]:
+    """sRGB's curve (IEC 61966-2-1) for shares in [0, 1]."""
+    return np.array(
+        [
+            [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in row]
+            for row in codes
+        ]
+    )
+
+
+def _colours_are(
+    rows: NDArray[np.float64], opacity: float = 1.0, of_faces: bool = False
+) -> Callable[[Any], bool]:
+    """Whether corners have these linear colours of their vertices, or of their triangles."""
+
+    def is_right(found: Any) -> bool:
+        mesh = found.mesh
+        index = np.repeat(np.arange(10), 3) if of_faces else SIDES.ravel()
+        positions = np.allclose(mesh.positions[mesh.corners], SOLID[SIDES.ravel()])
+        wanted = np.column_stack([rows[index], np.full(30, opacity)])
+        return bool(positions and np.allclose(mesh.corner_colours, wanted, atol=1e-6))
+
+    return is_right
+
+
+def _binary(order: str, vertex: str, face: str, *columns: Any, head: str = "") -> bytes:
+    """Rows packed by ``struct``'s letters, under a header."""
+    data = "".join(
+        f"{struct.pack(order + vertex, *row).hex()}" for row in np.column_stack(columns).tolist()
+    )
+    data += "".join(struct.pack(order + face, 3, *row).hex() for row in SIDES.tolist())
+    return head.encode() + bytes.fromhex(data)
+
+
+def _head(kind: str, vertex: Sequence[str] = _XYZ, face: Sequence[str] = _LISTS) -> str:
+    return ply_head(kind, vertex, face, (7, 10)) + "end_header\n"
+
+
+def _coloured(names: Sequence[str], values: Any) -> Callable[[Path], object]:
+    head = ply_head("ascii", (*_XYZ, *names), _LISTS, (7, 10)) + "end_header\n"
+    return text(head + rows_of(SOLID, values) + _FACES)
+
+
+def _strips(rows: Sequence[Sequence[int]]) -> Callable[[Path], object]:
+    head = ply_head("ascii", _XYZ, (), (7, 0)) + f"element tristrips {len(rows)}\n"
+    head += "property list int int vertex_indices\nend_header\n"
+    body = "".join(f"{len(row)} {' '.join(map(str, row))}\n" for row in rows)
+    return text(head + rows_of(SOLID) + body)
+
+
+def _is_the_ellipsoid(found: Any) -> bool:
+    """1, 2 and 1 wide; its strips, every second triangle turned, face inwards throughout."""
+    a, b, c = np.moveaxis(found.vertices[found.triangles], 1, 0)
+    volume = np.einsum("fi,fi->f", np.cross(b - a, c - a), a) / 6
+    on_it = np.allclose(np.linalg.norm(found.vertices / [1, 2, 1], axis=1), 1, atol=1e-5)
+    whole = -0.99 < volume.sum() / (8 / 3 * np.pi) < -0.95
+    return bool(on_it and whole and volume.max() < 1e-12)
+
+
+def _file_has_colours(found: Any) -> bool:
+    """Of each corner, as the file's bytes have it after its header."""
+    data = (FILES / "ply_vertex_colours.ply").read_bytes()
+    start = data.index(b"end_header\n") + 11
+    row = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
+    vertices = np.frombuffer(data, row, 544, start)
+    mesh = found.mesh
+    wanted = _linear(vertices["rgb"][mesh.corners] / 255.0)
+    return bool(
+        np.array_equal(mesh.positions, vertices["xyz"].astype(float))
+        and np.allclose(mesh.corner_colours[:, :3], wanted)
+        and np.ptp(wanted) > 0.1
+    )
+
+
+_EDGES = "element edge 2\nproperty int vertex1\nproperty int vertex2\n"
+_GRID = "element range_grid 2\nproperty list uchar int vertex_indices\n"
+_SPLAT = tuple(f"float {name}" for name in ("f_dc_0", "opacity", "scale_0", "rot_0"))
+_WEDGES = (*_LISTS, "list uchar float texcoord")
+_SOME_WEDGES = "".join(
+    f"3 {a} {b} {c} " + ("0\n" if n > 1 else f"6 {' '.join(map(str, UVS[[a, b, c]].ravel()))}\n")
+    for n, (a, b, c) in enumerate(SIDES.tolist())
+)
+_STRIP_TRIANGLES = np.array([[0, 1, 2], [2, 1, 3], [2, 3, 4], [1, 5, 0]])
+CASES = (
+    _case("ply_tristrips.ply", "triangle strips", None, "read", (), _is_the_ellipsoid),
+    _case(
+        "ply_vertex_colours.ply",
+        "colours of vertices",
+        None,
+        is_right=_file_has_colours,
+        read=_Polygons,
+    ),
+    _case(
+        "two_strips.ply",
+        "triangle strips",
+        _strips([[0, 1, 2, 3], [2, 3, 4], [1, 5, 0]]),
+        is_right=has_triangles(SOLID, _STRIP_TRIANGLES),
+    ),
+    _case(
+        "strips_apart_by_minus_one.ply",
+        "triangle strips",
+        _strips([[0, 1, 2, 3, -1, 2, 3, 4, -1, 1, 5, 0, -1]]),
+        is_right=has_triangles(SOLID, _STRIP_TRIANGLES),
+    ),
+    _case(
+        "colours_byte.ply",
+        "colours of vertices",
+        _coloured(_RGB, _CODES),
+        is_right=_colours_are(_linear(_CODES / 255)),
+        read=_Polygons,
+    ),
+    _case(
+        "colours_short.ply",
+        "colours of vertices",
+        _coloured(("ushort red", "ushort green", "ushort blue"), _CODES * 257),
+        is_right=_colours_are(_linear(_CODES / 255)),
+        read=_Polygons,
+    ),
+    _case(
+        "colours_float.ply",
+        "colours of vertices",
+        _coloured(("float red", "float green", "float blue"), _CODES / 255),
+        is_right=_colours_are(_linear(_CODES / 255)),
+        read=_Polygons,
+    ),
+    _case(
+        "colours_diffuse_alpha.ply",
+        "colours of vertices",
+        _coloured(
+            [f"uchar diffuse_{name}" for name in ("red", "green", "blue", "alpha")],
+            np.column_stack([_CODES, np.full(7, 51)]),
+        ),
+        is_right=_colours_are(_linear(_CODES / 255), 0.2),
+        read=_Polygons,
+    ),
+    _case(
+        "colours_of_faces.ply",
+        "colours of faces",
+        text(
+            ply_head("ascii", _XYZ, (*_LISTS, *_RGB), (7, 10))
+            + "end_header\n"
+            + rows_of(SOLID)
+            + rows_of(np.full(10, 3), SIDES, _CODES[[0, 1, 2, 3, 4, 5, 6, 0, 1, 2]])
+        ),
+        is_right=_colours_are(_linear(_CODES[[0, 1, 2, 3, 4, 5, 6, 0, 1, 2]] / 255), of_faces=True),
+        read=_Polygons,
+    ),
+    _case(
+        "colours_for_fur.ply",
+        "colours of vertices",
+        _coloured(_RGB, _CODES),
+        "told",
+        ["Colours of its vertices are not used"],
+    ),
+    _case(
+        "big_endian.ply",
+        "byte orders",
+        packed(
+            _binary(
+                ">",
+                "ddd",
+                "B3H",
+                SOLID,
+                head=_head(
+                    "binary_big_endian",
+                    ("double x", "double y", "double z"),
+                    ("list uint8 uint16 vertex_index",),
+                ),
+            )
+        ),
+    ),
+    _case(
+        "crlf_head.ply",
+        "line ends",
+        packed(
+            _binary(
+                "<", "fff", "B3i", SOLID, head=_head("binary_little_endian").replace("\n", "\r\n")
+            )
+        ),
+    ),
+    _case(
+        "int_counts.ply",
+        "types of numbers",
+        packed(
+            _binary(
+                "<",
+                "fff",
+                "i3I",
+                SOLID,
+                head=_head("binary_little_endian", face=("list int32 uint32 vertex_indices",)),
+            )
+        ),
+    ),
+    _case(
+        "int64.ply",
+        "types of numbers",
+        packed(
+            _binary(
+                "<",
+                "fff",
+                "B3q",
+                SOLID,
+                head=_head("binary_little_endian", face=("list uint8 int64 vertex_indices",)),
+            )
+        ),
+    ),
+    _case(
+        "confidence.ply",
+        "properties of scanners",
+        packed(
+            _binary(
+                "<",
+                "fffff",
+                "B3i",
+                SOLID,
+                np.full(7, 0.5),
+                np.full(7, 9),
+                head=_head("binary_little_endian", (*_XYZ, "float confidence", "float intensity")),
+            )
+        ),
+    ),
+    _case(
+        "obj_info.ply",
+        "headers",
+        text(_HEAD.replace("1.0\n", "1.0\nobj_info num_cols 512\ncomment zipper\n") + _BODY),
+    ),
+    _case("after_the_end.ply", "what follows the end", text(_HEAD + _BODY + "the end\n7 7 7\n")),
+    _case(
+        "bytes_after_the_end.ply",
+        "what follows the end",
+        packed(
+            _binary("<", "fff", "B3i", SOLID, head=_head("binary_little_endian")) + b"\0\xff junk"
+        ),
+    ),
+    _case(
+        "nan_unused.ply",
+        "numbers that are none",
+        text(
+            ply_head("ascii", _XYZ, _LISTS, (8, 10))
+            + "end_header\n"
+            + rows_of(SOLID)
+            + "-nan(ind) 1.#INF nan\n"
+            + _FACES
+        ),
+    ),
+    _case(
+        "nan_used.ply",
+        "numbers that are none",
+        text(
+            ply_head("ascii", _XYZ, _LISTS, (8, 11))
+            + "end_header\n"
+            + rows_of(SOLID)
+            + "nan nan nan\n"
+            + _FACES
+            + "3 0 1 7\n"
+        ),
+        "told",
+        ["1 face left out: positions"],
+    ),
+    _case(
+        "edges.ply",
+        "elements that are no faces",
+        text(_HEAD + _EDGES + _BODY + "0 1\n1 2\n"),
+        "told",
+        [r"'edge' \(2 rows\) not read"],
+    ),
+    _case(
+        "texture.ply",
+        "textures",
+        text(_HEAD.replace("1.0\n", "1.0\ncomment TextureFile skin.png\n") + _BODY),
+        "told",
+        ["1 texture not used: skin.png"],
+    ),
+    _case(
+        "some_wedges.ply",
+        "texture coordinates that are missing",
+        text(
+            ply_head("ascii", _XYZ, _WEDGES, (7, 10))
+            + "end_header\n"
+            + rows_of(SOLID)
+            + _SOME_WEDGES
+        ),
+        "told",
+        ["unwrapped anew"],
+        read=read_for_fur,
+    ),
+    _case(
+        "range_scan.ply",
+        "points without faces",
+        text(
+            ply_head("ascii", _XYZ, (), (7, 0))
+            + _GRID
+            + "end_header\n"
+            + rows_of(SOLID)
+            + "1 0\n0\n"
+        ),
+        "refused",
+        ["7 points without faces", "Poisson"],
+    ),
+    _case(
+        "cloud.ply",
+        "points without faces",
+        text(
+            ply_head("ascii", (*_XYZ, *_RGB), (), (7, 0)) + "end_header\n" + rows_of(SOLID, _CODES)
+        ),
+        "refused",
+        ["7 points without faces", "Poisson"],
+    ),
+    _case(
+        "splats.ply",
+        "Gaussian splats",
+        text(
+            ply_head("ascii", (*_XYZ, *_SPLAT), (), (7, 0))
+            + "end_header\n"
+            + rows_of(SOLID, np.ones((7, 4)))
+        ),
+        "refused",
+        ["Gaussian splats", "make a mesh"],
+    ),
+    _case(
+        "cut.ply",
+        "missing rows",
+        text((_HEAD + _BODY)[:-9]),
+        "refused",
+        ["truncated", "export it, or load it down, again"],
+    ),
+)
