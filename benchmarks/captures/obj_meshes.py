@@ -159,7 +159,9 @@ _CASES_OF_TEXT = (
     _case("smooth", "statements without effect", f"{_V}s 1\ng a b\ns off\nlod 3\n{_F}"),
     _case("comments", "comments", (_V + _F).replace("\n", " # 1 2 3\n") + "#\n# f 1 2 3\n"),
     _case("fo", "obsolete faces", (_V + _F).replace("f ", "fo ")),
-    _case("normals", "normals of the file", _V + "vn 0 0 1\n" * 6 + obj_faces(form="{0}//{0}")),
+    _case(
+        "given_normals", "normals of the file", _V + "vn 0 0 1\n" * 6 + obj_faces(form="{0}//{0}")
+    ),
     _case("weights", "weights of vertices", obj_vertices(after=["1.0"] * 7) + _F),
     _case("qnan", "numbers that are none", f"{_V}v 1.#QNAN -1.#IND 1.#INF\nvt nan\n{_F}"),
     _case(
@@ -206,7 +208,7 @@ _CASES_OF_TEXT = (
         _covers(4.0),
     ),
     _case(
-        "commas",
+        "decimal_commas",
         "decimal commas",
         _V.replace(".", ",") + _F,
         "told",

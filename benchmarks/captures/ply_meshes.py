@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.captures.case import FILES, Case, Ending
+from benchmarks.captures.case import Case, Ending
 from benchmarks.captures.mesh_truth import (
     SIDES,
     SOLID,
@@ -123,21 +123,6 @@ def _is_the_ellipsoid(found: Any) -> bool:
     return bool(on_it and whole and volume.max() < 1e-12)
 
 
-def _file_has_colours(found: Any) -> bool:
-    """Of each corner, as the file's bytes have it after its header."""
-    data = (FILES / "ply_vertex_colours.ply").read_bytes()
-    start = data.index(b"end_header\n") + 11
-    row = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
-    vertices = np.frombuffer(data, row, 544, start)
-    mesh = found.mesh
-    wanted = _linear(vertices["rgb"][mesh.corners] / 255.0)
-    return bool(
-        np.array_equal(mesh.positions, vertices["xyz"].astype(float))
-        and np.allclose(mesh.corner_colours[:, :3], wanted)
-        and np.ptp(wanted) > 0.1
-    )
-
-
 _EDGES = "element edge 2\nproperty int vertex1\nproperty int vertex2\n"
 _GRID = "element range_grid 2\nproperty list uchar int vertex_indices\n"
 _SPLAT = tuple(f"float {name}" for name in ("f_dc_0", "opacity", "scale_0", "rot_0"))
@@ -149,13 +134,6 @@ _SOME_WEDGES = "".join(
 _STRIP_TRIANGLES = np.array([[0, 1, 2], [2, 1, 3], [2, 3, 4], [1, 5, 0]])
 CASES = (
     _case("ply_tristrips.ply", "triangle strips", None, "read", (), _is_the_ellipsoid),
-    _case(
-        "ply_vertex_colours.ply",
-        "colours of vertices",
-        None,
-        is_right=_file_has_colours,
-        read=_Polygons,
-    ),
     _case(
         "two_strips.ply",
         "triangle strips",
