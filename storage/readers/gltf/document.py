@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from storage.readers.bad_input import BadInput
 
@@ -36,18 +36,60 @@ class _Wrong(Exception):  # noqa: N818 - never leaves this module
 
 
 _Check = Callable[[Any], Any]
+"""From a value to what it stands for; raises _Wrong."""
 
 
-class _Object(NamedTuple):
-    required: dict[str, Any]
-    optional: dict[str, Any]
+class _Object:
+    """An object with properties of known names; others are passed over."""
+
+    def __init__(self, required: Mapping[str, _Check], optional: Mapping[str, _Check]) -> None:
+        self._required, self._known = required, {**required, **optional}
+
+    def __call__(self, value: Any) -> Any:
+        if not isinstance(value, dict):
+            raise _Wrong(value, "an object")
+        name = ""
+        try:
+            for name in self._required:
+                if value.get(name) is None:
+                    raise _Wrong(_MISSING, "this property")
+            for name in [name for name in value if name in self._known]:
+                if value[name] is None:
+                    del value[name]
+                else:
+                    value[name] = self._known[name](value[name])
+        except _Wrong as wrong:
+            wrong.place.append(f".{name}")
+            raise
+        return value
 
 
-class _Each(NamedTuple):
-    """A list, or an object with names of its own, of what is alike."""
+class _ListOf:
+    """A list of what is alike."""
 
-    container: type[list[Any]] | type[dict[str, Any]]
-    check: Any
+    def __init__(self, check: _Check) -> None:
+        self._check = check
+
+    def __call__(self, value: Any) -> Any:
+        if not isinstance(value, list):
+            raise _Wrong(value, "a list")
+        row = 0
+        try:
+            for row, entry in enumerate(value):
+                value[row] = self._check(entry)
+        except _Wrong as wrong:
+            wrong.place.append(f"[{row}]")
+            raise
+        return value
+
+
+def _by_name(check: _Check) -> _Check:
+    """An object of what is alike, by names of its own."""
+
+    def checked_object(value: Any) -> Any:
+        return _Object({}, dict.fromkeys(value, check) if isinstance(value, dict) else {})(value)
+
+    return checked_object
 
 
 def checked(file: Path, description: Any) -> dict[str, Any]:
@@ -60,47 +102,13 @@ def checked(file: Path, description: Any) -> dict[str, Any]:
     if isinstance(description, dict):
         counts = {name: len(held) for name, held in description.items() if isinstance(held, list)}
     try:
-        document: dict[str, Any] = _checked(description, _table(counts))
+        document: dict[str, Any] = _table(counts)(description)
     except _Wrong as wrong:
         field = "".join(reversed(wrong.place)).lstrip(".") or "content"
         shown = _MISSING if wrong.found is _MISSING else json.dumps(wrong.found)[:60]
         expected = f"{wrong.expected}, as glTF 2.0 has it, {_WAY_OUT}"
         raise BadInput(file, field, shown, expected) from None
     return document
-
-
-def _checked(value: Any, check: Any) -> Any:
-    if isinstance(check, _Each):
-        is_list = check.container is list
-        if not isinstance(value, check.container):
-            raise _Wrong(value, "a list" if is_list else "an object")
-        held: Any = value
-        for key in range(len(held)) if is_list else list(held):
-            held[key] = _at(held[key], check.check, f"[{key}]" if is_list else f".{key}")
-        return held
-    if not isinstance(check, _Object):
-        return check(value)
-    if not isinstance(value, dict):
-        raise _Wrong(value, "an object")
-    for name in check.required:
-        if value.get(name) is None:
-            missing = _Wrong(_MISSING, "this property")
-            missing.place.append(f".{name}")
-            raise missing
-    for name, inner in (check.required | check.optional).items():
-        if name in value and value[name] is None:
-            del value[name]
-        elif name in value:
-            value[name] = _at(value[name], inner, f".{name}")
-    return value
-
-
-def _at(value: Any, check: Any, place: str) -> Any:
-    try:
-        return _checked(value, check)
-    except _Wrong as wrong:
-        wrong.place.append(place)
-        raise
 
 
 # --- Checks of single values --------------------------------------------------------------------
@@ -167,18 +175,18 @@ def _table(counts: dict[str, int]) -> _Object:
 
         return check
 
-    attributes = _Each(dict, to("accessors"))
+    attributes = _by_name(to("accessors"))
     compressed = _Object(
         {"buffer": to("buffers"), "byteLength": _whole, "byteStride": _whole, "count": _whole},
         {"byteOffset": _whole, "mode": _text, "filter": _text},
     )
-    draco = _Object({"bufferView": to("bufferViews"), "attributes": _Each(dict, _whole)}, {})
+    draco = _Object({"bufferView": to("bufferViews"), "attributes": _by_name(_whole)}, {})
     primitive = _Object(
         {"attributes": attributes},
         {
             "indices": to("accessors"),
             "mode": _one_of(*range(7)),
-            "targets": _Each(list, attributes),
+            "targets": _ListOf(attributes),
             "extensions": _Object({}, {DRACO: draco}),
         },
     )
@@ -206,31 +214,31 @@ def _table(counts: dict[str, int]) -> _Object:
     node = _Object(
         {},
         {
-            "children": _Each(list, to("nodes")),
+            "children": _ListOf(to("nodes")),
             "mesh": to("meshes"),
             "skin": to("skins"),
             "matrix": _numbers(16),
             "translation": _numbers(3),
             "rotation": _numbers(4),
             "scale": _numbers(3),
-            "weights": _Each(list, _number),
+            "weights": _ListOf(_number),
             "extensions": _Object({}, node_extensions),
         },
     )
-    skin = _Object({"joints": _Each(list, to("nodes"))}, {"inverseBindMatrices": to("accessors")})
-    mesh = _Object({"primitives": _Each(list, primitive)}, {"weights": _Each(list, _number)})
+    skin = _Object({"joints": _ListOf(to("nodes"))}, {"inverseBindMatrices": to("accessors")})
+    mesh = _Object({"primitives": _ListOf(primitive)}, {"weights": _ListOf(_number)})
     return _Object(
         {"asset": _Object({}, {})},
         {
             "scene": to("scenes"),
-            "scenes": _Each(list, _Object({}, {"nodes": _Each(list, to("nodes"))})),
-            "nodes": _Each(list, node),
-            "meshes": _Each(list, mesh),
-            "skins": _Each(list, skin),
-            "accessors": _Each(list, accessor),
-            "bufferViews": _Each(list, view),
-            "buffers": _Each(list, _Object({"byteLength": _whole}, {"uri": _text})),
-            "extensionsUsed": _Each(list, _text),
-            "extensionsRequired": _Each(list, _text),
+            "scenes": _ListOf(_Object({}, {"nodes": _ListOf(to("nodes"))})),
+            "nodes": _ListOf(node),
+            "meshes": _ListOf(mesh),
+            "skins": _ListOf(skin),
+            "accessors": _ListOf(accessor),
+            "bufferViews": _ListOf(view),
+            "buffers": _ListOf(_Object({"byteLength": _whole}, {"uri": _text})),
+            "extensionsUsed": _ListOf(_text),
+            "extensionsRequired": _ListOf(_text),
         },
     )
