@@ -59,7 +59,7 @@ _PROFILES = (
         _PROFILE_16,
         read_photograph,
         "told",
-        ["made by hand", "outside of sRGB"],
+        ["made by hand", "outside of it"],
         is_light(_clipped(_by_profile(_DEEP, DISPLAY_P3, 2.2)), 2e-3),
         save_png(_DEEP, 2, iccp(rgb_profile(DISPLAY_P3, 2.2))),
     ),

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from benchmarks.captures.case import Case, Ending
 from benchmarks.captures.photograph_files import (
+    ADOBE_RGB,
     HEIGHT,
     WIDTH,
     Right,
     Writer,
     exif,
+    in_srgb,
     is_light,
     light_of,
     noise,
@@ -224,6 +226,14 @@ def _mpf(kinds: Sequence[int]) -> bytes:
     return b"MPF\0MM\0*" + struct.pack(">IH", 8, 3) + fields + bytes(4) + entries
 
 
+def _interoperability(index: bytes) -> bytes:
+    """EXIF with the index in a directory of the directory of EXIF's own tags (DCF 2.0)."""
+    first = struct.pack(">HHHIII", 1, 0x8769, 4, 1, 26, 0)
+    second = struct.pack(">HHHIII", 1, 0xA005, 4, 1, 44, 0)
+    third = struct.pack(">HHHI4sI", 1, 1, 2, 4, index, 0)
+    return b"MM\0*\0\0\0\x08" + first + second + third
+
+
 _SMOOTH = is_light(light_of(_SLOPE), _LOSSY)
 _JPEGS = (
     _case(
@@ -278,6 +288,19 @@ _JPEGS = (
         "turned upright: JPEG",
         is_light(light_of(stored_as(_SLOPE, 3)), _LOSSY),
         _with_segment(0xE1, _xmp('<x tiff:Orientation="3"/>')),
+    ),
+    _case(
+        "adobergb_by_exif.jpg",
+        "a colour space named in EXIF alone",
+        is_light(np.clip(in_srgb((_SLOPE / 255) ** (563 / 256), ADOBE_RGB), 0, 1), _LOSSY),
+        _with_segment(0xE1, b"Exif\0\0" + _interoperability(b"R03\0")),
+        "Adobe RGB",
+    ),
+    _case(
+        "srgb_by_exif.jpg",
+        "a colour space named in EXIF alone",
+        _SMOOTH,
+        _with_segment(0xE1, b"Exif\0\0" + _interoperability(b"R98\0")),
     ),
     _case(
         "exif_damaged.jpg",

@@ -55,7 +55,7 @@ def without_profile(
     outside = ((light < -0.002) | (light > most + 0.002)).any(axis=2)
     note = f"The colours were converted to sRGB from the ICC profile '{name}'"
     if outside.any():
-        note += f"; {outside.mean():.1%} of the pixels lie outside of sRGB and were clipped"
+        note += f"; {100 * outside.mean():.2g} % of the pixels lie outside of it and were clipped"
     return np.clip(light, 0, most, out=light), (f"{note}.",)
 
 

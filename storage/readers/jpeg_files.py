@@ -7,7 +7,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from storage.readers.bad_input import BadInput
+from storage.readers.code_points import in_srgb
 from storage.readers.decoded_image import StoredPicture
 from storage.readers.pillow_pictures import load, opened, stored_picture
 
@@ -15,6 +18,8 @@ _MANY_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture
 _MOST_SCANNED = 1_000_000_000  # pixels, which take some seconds
 _FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})  # markers of a frame's header
 _READ_FRAMES = (0xC0, 0xC1, 0xC2, 0xC9, 0xCA)  # baseline, extended, progressive; by either coder
+_INTEROPERABILITY = 0xA005
+_ADOBE_RGB = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.3290)
 _LEFT_OUT = (
     (b"hdrgm:Version", "Its gain map (HDR) was left out: the standard picture was read."),
     (b"HDRGainMap", "Its gain map (HDR) was left out: the standard picture was read."),
@@ -39,7 +44,26 @@ def read_jpeg(file: Path) -> StoredPicture:
         raise BadInput(file, "number of scans", f"{scans}", f"at most {_MANY_SCANS}; save it again")
     image = load(file, JpegImagePlugin.JpegImageFile, io.BytesIO(data))
     said = dict.fromkeys(note for mark, note in _LEFT_OUT if mark in data)
-    return stored_picture(image, notes=(*said, *([] if said else _more_pictures(image))))
+    stored = stored_picture(image, notes=(*said, *([] if said else _more_pictures(image))))
+    return _from_adobe_rgb(stored) if _is_adobe_rgb(image) else stored
+
+
+def _is_adobe_rgb(image: Any) -> bool:
+    """Whether a camera that wrote no profile has said so in EXIF (DCF 2.0, the optional colour
+    space): the interoperability index."""
+    if image.mode != "RGB" or image.info.get("icc_profile"):
+        return False
+    try:
+        return bool(image.getexif().get_ifd(_INTEROPERABILITY).get(1) == "R03")
+    except Exception:  # SyntaxError, struct.error and others by what is broken
+        return False
+
+
+def _from_adobe_rgb(stored: StoredPicture) -> StoredPicture:
+    light = (np.arange(256) / 255) ** (563 / 256)
+    colours = np.minimum(in_srgb(light.astype(np.float32)[stored.values], _ADOBE_RGB), 1)
+    note = "The colours were converted to sRGB from Adobe RGB, which the EXIF block names."
+    return stored._replace(values=colours, notes=(*stored.notes, note))
 
 
 def _check_frame(file: Path, data: bytes) -> None:

@@ -201,7 +201,8 @@ def _mended(
             notes.append(f"{_pixels(unknown)} no number and became like the nearest one.")
     negative = light < 0
     if negative.any():
-        if -float(light[negative].sum()) > _MOST_NEGATIVE * float(np.abs(light).sum()):
+        amount = np.abs(light, dtype=np.float64)
+        if amount[negative].sum() > _MOST_NEGATIVE * amount.sum():
             raise BadInput(
                 file,
                 "light",
