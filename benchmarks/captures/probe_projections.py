@@ -161,6 +161,13 @@ _FORMATS = (
         "refused",
         ["PFM", "oiiotool"],
     ),
+    probe(
+        "lfs.hdr",
+        "a pointer instead of the file",
+        b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64 + b"\nsize 9\n",
+        "refused",
+        ["pointer of Git LFS", "git lfs pull"],
+    ),
     probe("empty.hdr", "no picture", b"", "refused", ["empty", "a Radiance .hdr or an OpenEXR"]),
     probe(
         "black.hdr",

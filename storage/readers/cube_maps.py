@@ -46,6 +46,7 @@ _COLUMN = (
     _Face(4, 0, _AHEAD, _RIGHT, _UP),
     _Face(5, 0, _BACK, _LEFT, _UP),
 )
+_BLOCK = 64  # rows at once
 _EMPTY = 1e-3  # of the picture's mean, by which the corners of a cross may differ
 
 
@@ -78,24 +79,35 @@ def of_column(picture: NDArray[Any]) -> NDArray[np.float32]:
 
 def _unfolded(picture: NDArray[Any], faces: tuple[_Face, ...], size: int) -> NDArray[np.float32]:
     """Linear between a face's texels."""
-    from scipy.ndimage import map_coordinates
+    import cv2
 
+    texels = np.ascontiguousarray(picture, np.float32)
     longitude = (np.arange(4 * size) + 0.5) / (4 * size) * 2 * np.pi - np.pi
-    latitude = np.pi / 2 - (np.arange(2 * size) + 0.5) / (2 * size) * np.pi
-    direction = np.empty((2 * size, 4 * size, 3), np.float32)
-    direction[..., 0] = np.cos(latitude)[:, None] * np.sin(longitude)
-    direction[..., 1] = np.sin(latitude)[:, None]
-    direction[..., 2] = np.cos(latitude)[:, None] * np.cos(longitude)
-    nearest = np.stack([direction @ np.array(face.middle) for face in faces]).argmax(axis=0)
     whole = np.empty((2 * size, 4 * size, picture.shape[2]), np.float32)
+    for first in range(0, 2 * size, _BLOCK):
+        rows = np.arange(first, min(first + _BLOCK, 2 * size))
+        latitude = (np.pi / 2 - (rows + 0.5) / (2 * size) * np.pi)[:, None]
+        x, z = np.cos(latitude) * np.sin(longitude), np.cos(latitude) * np.cos(longitude)
+        direction = np.stack([x, np.sin(latitude) + 0 * longitude, z], axis=-1).astype(np.float32)
+        across, down = _places(direction, faces, size)
+        seen = cv2.remap(texels, across, down, cv2.INTER_LINEAR)
+        whole[rows] = seen.reshape(*seen.shape[:2], -1)
+    return whole
+
+
+def _places(
+    direction: NDArray[np.float32], faces: tuple[_Face, ...], size: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Column and row in the layout of what is seen in each direction, within its face."""
+    across = np.empty(direction.shape[:2], np.float32)
+    down = np.empty_like(across)
+    nearest = np.stack([direction @ np.array(face.middle, "f4") for face in faces]).argmax(axis=0)
     for number, face in enumerate(faces):
         here = nearest == number
         seen = direction[here]
-        seen = seen / (seen @ np.array(face.middle))[:, None]
-        rows = (1 - seen @ np.array(face.up)) / 2 * size - 0.5
-        columns = (1 + seen @ np.array(face.right)) / 2 * size - 0.5
-        top, left = face.row * size, face.column * size
-        for channel in range(picture.shape[2]):
-            texels = picture[top : top + size, left : left + size, channel].astype(np.float32)
-            whole[here, channel] = map_coordinates(texels, [rows, columns], order=1, mode="nearest")
-    return whole
+        seen = seen / (seen @ np.array(face.middle, "f4"))[:, None]
+        column = (1 + seen @ np.array(face.right, "f4")) / 2 * size - 0.5
+        row = (1 - seen @ np.array(face.up, "f4")) / 2 * size - 0.5
+        across[here] = face.column * size + column.clip(0, size - 1)
+        down[here] = face.row * size + row.clip(0, size - 1)
+    return across, down

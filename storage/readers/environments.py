@@ -47,6 +47,7 @@ _OTHER_SIGNATURES = {
     b"DDS ": ("DDS", _CONVERTED),
     b"\xabKTX": ("KTX", _CONVERTED),
     b"\xff\x0a": ("JPEG XL", _CONVERTED),
+    b"version https://git-lfs": ("a pointer of Git LFS", "the file itself: run git lfs pull"),
     b"\0\0\0\x0cJXL ": ("JPEG XL", _CONVERTED),
 }
 _LONGEST_HEADER = 1_000_000  # bytes of a Radiance header; the usual ones have some hundred
