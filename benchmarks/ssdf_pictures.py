@@ -18,12 +18,11 @@ import xarray as xr
 from PIL import Image
 
 from assets_defs.ssdf_lighting.datasets import decoder_of, scene_of
-from assets_defs.ssdf_lighting.frames import FrameSettings
 from assets_defs.ssdf_lighting.lights import LightSettings
 from assets_defs.workspace import CHECKOUT
 from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting.compression.lookup import matrix_along
-from pipelines.ssdf_lighting.drawing import frames
+from pipelines.ssdf_lighting.drawing import frames, viewpoints
 from pipelines.ssdf_lighting.drawing.pictures import error_map
 from pipelines.ssdf_lighting.figures import psnr
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
@@ -37,7 +36,7 @@ PICTURE = CHECKOUT / "docs" / "pictures" / "ssdf-mitsuba.png"
 
 def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """Frames a second while the light turns, PSNR, and the picture of where Mitsuba differs."""
-    scene, settings, look = scene_of(stored("scene_mesh")), LightSettings(), FrameSettings()
+    scene, settings = scene_of(stored("scene_mesh")), LightSettings()
     sky = built_in_environments.sky(
         256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
     )
@@ -47,7 +46,8 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         least_sharpness=settings.least_sharpness,
         most_sharpness=settings.most_sharpness,
     ).lights
-    camera = frames.scene_camera(scene, look.azimuth, look.elevation, SIZE[0] / SIZE[1])
+    around, above = viewpoints.AZIMUTH, viewpoints.ELEVATION
+    camera = viewpoints.scene_camera(scene, around, above, SIZE[0] / SIZE[1])
     matrix = stored("ssdf_matrix")["distances"].values
     basis = stored("ssdf_basis")
     decoder = decoder_of(basis)

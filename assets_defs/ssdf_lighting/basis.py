@@ -58,8 +58,8 @@ class BasisSettings(Settings):
 
 @SSDF.before_work
 def check_compression(sources: Mapping[str, Source], settings: Mapping[str, Settings]) -> None:
-    """Raises ValueError for sizes and bytes that cannot be, before any ray is traced: more clusters
-    than triangles, more values than rows, an error below that of the shared basis."""
+    """Raises ValueError for sizes and bytes that cannot be, before any ray is traced: more values
+    than rows, an error below that of the shared basis."""
     if "scene" not in sources or "ssdf_basis" not in settings:
         return
     size, rays = settings["scene_mesh"], settings["visibility"]
@@ -69,13 +69,8 @@ def check_compression(sources: Mapping[str, Source], settings: Mapping[str, Sett
     assert isinstance(clustering, ClusterSettings)
     assert isinstance(basis, BasisSettings)
     scene, name = load_scene(sources["scene"], size), sources["scene"].name
-    vertices, triangles = len(scene.vertices), len(scene.triangles)
+    vertices = len(scene.vertices)
     check_size(name, vertices, rays)
-    if clustering.clusters > triangles:
-        raise ValueError(
-            f"{name}: clusters is {clustering.clusters}; expected at most {triangles}, the number "
-            "of triangles."
-        )
     if basis.coding == "paper":
         rows = min(vertices, rays.directions)
         if basis.contribution is None and basis.values > rows:

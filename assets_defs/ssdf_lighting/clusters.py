@@ -116,12 +116,13 @@ def triangle_clusters(
         lambda fraction: progress(0.8 * fraction),
     )
     vertices, triangles = scene_mesh["vertices"].values, scene_mesh["triangles"].values
-    # Of few triangles none has more than a few to be compressed with.
-    count, seed = min(settings.clusters, max(1, len(triangles) // 4)), settings.cluster_seed
+    count, seed = min(settings.clusters, len(triangles)), settings.cluster_seed
     if settings.space == "positions":
         found = triangle_clusters.clusters_by_position(vertices, triangles, count, seed)
     else:
         found = triangle_clusters.clusters_by_distance(basis.coordinates, triangles, count, seed)
-    fewer = f"{count} clusters instead of {settings.clusters}: there are {len(triangles)} triangles."
+    fewer = (
+        f"{count} clusters instead of {settings.clusters}: there are {len(triangles)} triangles."
+    )
     notes = [fewer] if count < settings.clusters else []
     return clusters_dataset(found, basis), {"components": len(basis.sigma), NOTES: notes}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
@@ -18,7 +18,7 @@ from assets_defs.ssdf_lighting.datasets import (
     scene_of,
 )
 from assets_defs.ssdf_lighting.declaration import SSDF
-from assets_defs.system import Pictures, Progress, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.ssdf_lighting import figures
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
     from numpy.typing import NDArray
+
+    from pipelines.ssdf_lighting.drawing.frames import RelitFrames
+    from pipelines.ssdf_lighting.drawing.viewpoints import Viewpoint
 
 _GAIN = 8.0
 """Of the pictures of differences."""
@@ -40,8 +43,15 @@ class FrameSettings(Settings):
     reference_samples: int = Field(
         16, ge=2, le=65_536, description="Rays a pixel of the traced picture"
     )
-    azimuth: float = Field(-62.0, ge=-360.0, le=360.0, description="The camera's, degrees")
-    elevation: float = Field(24.0, ge=-89.0, le=89.0, description="The camera's, degrees")
+    azimuth: float | None = Field(
+        None,
+        ge=-360.0,
+        le=360.0,
+        description="The camera's, degrees; default: -62, or so that open boxes are looked into",
+    )
+    elevation: float | None = Field(
+        None, ge=-89.0, le=89.0, description="The same: default: 24, or as boxes need it"
+    )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"width": 96, "frames": 2, "reference_samples": 8},
@@ -87,6 +97,12 @@ def _reference_psnr(version: StoredVersion) -> float:
     return _psnr(version, "reference")
 
 
+def _colour_error(version: StoredVersion) -> float:
+    pictures = version.dataset
+    first, traced = pictures["frames"].values[0], pictures["reference"].values
+    return figures.colour_error(first, traced, _shows_scene(pictures))
+
+
 def _mean_brightness(version: StoredVersion) -> float:
     pictures = version.dataset
     return figures.mean_brightness(pictures["frames"].values, _shows_scene(pictures))
@@ -119,6 +135,13 @@ def _coverage(version: StoredVersion) -> float:
             change=0.5,
         ),
         Check(
+            "colour_error",
+            "How far the mean colours of the drawn and of the traced picture's scene are apart.",
+            _colour_error,
+            at_most=0.06,
+            change=0.01,
+        ),
+        Check(
             "coverage",
             "Share of the picture with the scene.",
             _coverage,
@@ -145,23 +168,35 @@ def relit_frames(
     environment_lights: xr.Dataset,
 ) -> Result:
     """Draw the scene under the turning light; the first frame also not compressed, and traced."""
-    import numpy as np
-
     from pipelines.ssdf_lighting.drawing import frames
+    from pipelines.ssdf_lighting.drawing.viewpoints import viewpoint
 
     scene, lights = scene_of(scene_mesh), lights_of(environment_lights)
     size = (settings.width, settings.width * 3 // 4)
-    camera = frames.scene_camera(scene, settings.azimuth, settings.elevation, size[0] / size[1])
+    view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
     turns = [360.0 * number / settings.frames for number in range(settings.frames)]
     distances = frames.ComparedDistances(
         decoder_of(ssdf_basis).distances_along, partial(matrix_distances_along, ssdf_matrix)
     )
     found = frames.relit_frames(
-        scene, lights, distances, camera, size, turns, settings.reference_samples, progress
+        scene, lights, distances, view.camera, size, turns, settings.reference_samples, progress
     )
-    clusters = frames.cluster_picture(scene, triangle_clusters["cluster"].values, camera, size)
+    clusters = frames.cluster_picture(scene, triangle_clusters["cluster"].values, view.camera, size)
     return frames_dataset(found, turns, clusters), {
+        "sharpest λ": float(lights.sharpness.max()),
+        **_told(found, view),
+    }
+
+
+def _told(found: RelitFrames, view: Viewpoint) -> dict[str, Any]:
+    import numpy as np
+
+    share = f"{view.behind:.0%} of what is seen are back sides"
+    notes = [f"{share}, which are lit as their front sides are."] if view.behind > 0.01 else []
+    return {
         "frames a second": 1.0 / float(np.median(found.turning.seconds)),
         "renderer": found.turning.renderer,
-        "sharpest λ": float(lights.sharpness.max()),
+        "azimuth": view.azimuth,
+        "elevation": view.elevation,
+        NOTES: notes,
     }

@@ -10,7 +10,7 @@ from pydantic import Field
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.ssdf_lighting.datasets import scene_dataset
+from assets_defs.ssdf_lighting.datasets import scene_dataset, scene_of
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.ssdf_lighting.file_materials import materials_of, textures_of_file
 from assets_defs.system import NOTES, Result
@@ -77,6 +77,10 @@ def _area(version: StoredVersion) -> float:
     return figures.surface_area(mesh["vertices"].values, mesh["triangles"].values)
 
 
+def _reflectance(version: StoredVersion) -> float:
+    return figures.reflectance(scene_of(version.dataset))
+
+
 @SSDF.asset(
     schemas.SCENE_MESH,
     by=("scene",),
@@ -90,6 +94,14 @@ def _area(version: StoredVersion) -> float:
             at_most=0.02,
         ),
         Check("area", "Area in squared scene radii.", _area, at_least=1e-6, change=0.01),
+        Check(
+            "reflectance",
+            "Share of white light that its surfaces reflect, by textures where they have them.",
+            _reflectance,
+            at_least=0.005,
+            at_most=1.5,
+            change=0.01,
+        ),
     ),
 )
 def scene_mesh(settings: SceneSettings, source: Source) -> Result:

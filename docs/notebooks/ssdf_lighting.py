@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 from pipelines.light.built_in_environments import sky
 from pipelines.ssdf_lighting.compression import compact_file, decoder
 from pipelines.ssdf_lighting.distances.refined import scene_distances
-from pipelines.ssdf_lighting.drawing import frames
+from pipelines.ssdf_lighting.drawing import frames, viewpoints
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.scene import built_in_scene
 
@@ -27,7 +27,7 @@ file = compact_file.compress(matrix, scene.triangles, clusters=24, rmse=0.02)
 
 # %%
 lights = fit_lights(sky(32, sun_azimuth=25.0, sun_elevation=35.0), 4).lights
-camera, basis = frames.scene_camera(scene, -62, 24, 4 / 3), decoder.Decoder.of_file(file)
+camera, basis = viewpoints.scene_camera(scene, -62, 24, 4 / 3), decoder.Decoder.of_file(file)
 turn = frames.draw_turning_light(scene, lights, basis.distances_along, camera, (480, 360), [0.0])
 plt.imshow(frames.exposed(turn.radiance[0], frames.scene_exposure(turn)))
 plt.show()

@@ -4,11 +4,12 @@ compression, pictures. Functions of arrays; what is large comes in blocks."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.colour import decode_srgb
 from pipelines.geometry.mesh_edges import edge_vertices
 from pipelines.ssdf_lighting.distances.octahedral import (
     NO_EDGE,
@@ -18,6 +19,9 @@ from pipelines.ssdf_lighting.distances.octahedral import (
     texel_directions,
 )
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
+
+if TYPE_CHECKING:
+    from pipelines.ssdf_lighting.scene import Scene
 
 FloatArray = NDArray[np.float64]
 
@@ -274,6 +278,45 @@ def psnr(
     """
     difference = picture[shown].astype(np.float64) - reference[shown]
     return float(10.0 * np.log10(255.0**2 / max((difference**2).mean(), 1e-12)))
+
+
+def colour_error(
+    picture: NDArray[np.uint8], reference: NDArray[np.uint8], shown: NDArray[np.bool_]
+) -> float:
+    """How far the mean colours of two sRGB pictures (H, W, 3) over the pixels ``shown`` (H, W) are
+    apart: the largest difference of their shares of red, green and blue, in linear light.
+
+    >>> grey = np.full((4, 4, 3), 100, np.uint8)
+    >>> red = np.broadcast_to(np.array([100, 0, 0], np.uint8), (4, 4, 3))
+    >>> round(colour_error(red, grey, np.ones((4, 4), bool)), 3)
+    0.667
+    """
+    one, other = (
+        decode_srgb(shot[shown] / 255.0).reshape(-1, 3).mean(axis=0)
+        for shot in (picture, reference)
+    )
+    apart = one / max(one.sum(), 1e-9) - other / max(other.sum(), 1e-9)
+    return float(np.abs(apart).max())
+
+
+def reflectance(scene: Scene) -> float:
+    """What the surfaces of a scene reflect, the mean over their area: albedo and gloss, the mean of
+    red, green and blue; where textures are, as at the middles of the triangles."""
+    from pipelines.ssdf_lighting.surface_textures import Sampler
+
+    corners = scene.vertices[scene.triangles]
+    edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.linalg.norm(np.cross(*edges), axis=1)
+    reflected = scene.materials.albedo.mean(axis=1) + scene.materials.specular
+    shares = reflected[scene.part]
+    if scene.textures is not None:
+        for material in scene.textures.materials:
+            rows = np.flatnonzero(scene.part == material.row)
+            uvs, colours = scene.textures.uvs[rows], scene.textures.colours[rows]
+            size = np.linalg.norm(np.ptp(uvs, axis=1), axis=2).astype(np.float64)
+            looks = Sampler(material).looks_at(uvs.mean(axis=1), colours.mean(axis=1), size)
+            shares[rows] = looks.albedo.mean(axis=1) + looks.specular
+    return float(np.average(shares, weights=area))
 
 
 def mean_brightness(frames: NDArray[np.uint8], shown: NDArray[np.bool_]) -> float:

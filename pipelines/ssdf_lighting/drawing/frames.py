@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import auto_exposure, to_8bit
-from pipelines.drawing.stage import PAINTED, Camera, Stage, fitting_distance, orbit, surface
+from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor
@@ -21,7 +21,6 @@ Progress = Callable[[float], None]
 DistancesAlong = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
 """Vertices (P,) and axes (P, L, 3) -> d (P, L), radians."""
 
-VIEW_ANGLE = 30.0
 _BACKGROUND = (0.02, 0.02, 0.025)
 
 
@@ -36,24 +35,6 @@ class TurningLight(NamedTuple):
     covered: NDArray[np.float32]
     seconds: NDArray[np.float64]
     renderer: str
-
-
-def scene_camera(scene: Scene, azimuth: float, elevation: float, aspect: float) -> Camera:
-    """A camera on an orbit, so near that all that stands on the floor just fits in; degrees.
-
-    The floor is taken to be what lies lowest: a twentieth of the scene's height.
-    """
-    height = np.ptp(scene.vertices[:, 2])
-    raised = scene.vertices[scene.vertices[:, 2] > scene.vertices[:, 2].min() + 0.05 * height]
-    shown = raised if len(raised) else scene.vertices
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    x, y, z = (low + high) / 2.0
-    target = (float(x), float(y), float(z))
-    box = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), -1).reshape(-1, 3)
-    distance = fitting_distance(
-        box, target, azimuth, elevation, view_angle=VIEW_ANGLE, aspect=aspect
-    )
-    return orbit(target, 1.25 * distance, azimuth, elevation, view_angle=VIEW_ANGLE)
 
 
 def draw_turning_light(
