@@ -22,6 +22,8 @@ _BEGINS_AS_NUMBER = re.compile(r"[-+\u2212]?\.?(\d|inf)")
 _DATE = re.compile(r"\d+[./:-]\d+[./:-]\d+")
 _SAMPLE = 1500  # lines that tell the separator
 _SURE = 3  # rows one after the other are a table, not numbers among an instrument's settings
+_MOST_COLUMNS = 200
+_MOST_CELLS = 2_000_000
 _PREAMBLE_LINES = 1000
 _LONGEST_SAID = 1000  # characters: looking for words takes their square
 _HEADER_LINES = 8
@@ -59,6 +61,7 @@ def table_of(file: Path, lines: Sequence[Line]) -> Table:
     plain = [line for line in lines if not _COMMENT.match(line[1])]
     if len(plain) > MOST_POINTS + _PREAMBLE_LINES:  # at once; it takes a second to look at them
         raise too_many(file, len(plain))
+    _check_cells(file, plain)
     separator = _separator(plain)
     split = [(number, split_cells(text, separator)) for number, text in plain]
     kinds = [_kind(cells) for _, cells in split]
@@ -89,6 +92,24 @@ def table_of(file: Path, lines: Sequence[Line]) -> Table:
     if columns is not None:
         columns += (Column("", "other", None),) * (width - len(columns))
     return Table(separator, columns, width, rows, [text for _, text in before], starts)
+
+
+def _check_cells(file: Path, lines: Sequence[Line]) -> None:
+    """Refuse a matrix of heights at once: looking at each of its cells takes minutes."""
+    total = wide = 0
+    for _, text in lines:
+        marks = max(text.count(separator) for separator in ("\t", ";", ","))
+        cells = max(marks + 1, len(text.split()))
+        total += cells
+        wide += cells > _MOST_COLUMNS
+    if total > _MOST_CELLS or wide > _SURE:
+        raise BadInput(
+            file,
+            "number of cells",
+            f"{total} in {len(lines)} lines",
+            f"at most {_MOST_COLUMNS} in a line and {_MOST_CELLS} in all: of a measured area "
+            "export one profile",
+        )
 
 
 def split_cells(line: str, separator: str) -> list[str]:

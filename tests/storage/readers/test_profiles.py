@@ -290,6 +290,7 @@ REFUSED: list[tuple[str | bytes, str]] = [
     ("# step 5 um\n# step 6 um\n0\n1\n2\n", "distance of points is 5 and 6; expected one: give it"),
     ("0,5,1,5\n1,5,1,5\n", "number of columns is 4 without names; expected a header that names"),
     ("\t0\t1\n1\t1\t2\n", "number of columns is 3 without names"),
+    (("1;" * 300 + "\n") * 9, "number of cells is 2709 in 9 lines; expected at most 200 in a line"),
     ("# of a knife\n0,0\r\n1,one\r\n2,0\r\n", "line 3 is '1,one'; expected numbers, as on the"),
     ("0,0\n1,1\n2,0\n3,one\n", "line 4 is '3,one'; expected numbers"),
     ("0,0\n1,\n2,0\n", f"{FEW} 2, 1 more without a height; expected at least 3"),
