@@ -38,6 +38,7 @@ def unwrap(
     options.texels_per_unit = 256.0  # sets the packing's precision and the unit of its size
     atlas.generate(pack_options=options)
     sources, faces, uvs = atlas[0]
+    uvs = np.nan_to_num(uvs)  # of triangles that vanish in its floats
     size = np.array([atlas.width, atlas.height], np.float64)
     faces = faces.astype(np.int64)
     return vertices[sources], faces, _not_mirrored(uvs * size / options.texels_per_unit, faces)

@@ -154,7 +154,7 @@ class _Content:
         notes = []
         if self.others:
             things = " and ".join(counted(n, thing) for thing, n in self.others.items())
-            if not self.sizes:
+            if not self.sizes and set(self.others) != {"point"}:
                 expected = "faces: convert curves and surfaces to polygons where they were made"
                 raise BadInput(file, "content", f"{things} without faces", expected)
             notes.append(f"{things} not read: only polygons are.")

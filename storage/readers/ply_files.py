@@ -85,7 +85,8 @@ def _corners(file: Path, columns: _Columns, one: str) -> Lists:
     lists = next((columns[name] for name in _CORNERS if name in columns), None)
     if not isinstance(lists, Lists):
         return Lists(np.zeros(0, np.int64), np.zeros(0))
-    if (wrong := ~(np.abs(lists.values) < 2**53) | (lists.values % 1 != 0)).any():
+    known = np.where(np.abs(lists.values) < 2**53, lists.values, 0.5)
+    if (wrong := known % 1 != 0).any():
         corner = int(np.argmax(wrong))
         row = int(np.searchsorted(np.cumsum(lists.lengths), corner, side="right"))
         found = f"a reference to vertex {lists.values[corner]:g}"
@@ -128,7 +129,8 @@ def _uvs(
     if names is not None:
         return _of_corners(np.stack([vertex[name] for name in names], axis=1), corners)
     wedges = face.get("texcoord")
-    if not isinstance(wedges, Lists) or len(polygons.values) != len(corners):
+    whole = len(polygons.values) == len(corners)  # no strips
+    if not isinstance(wedges, Lists) or len(wedges.lengths) != len(polygons.lengths) or not whole:
         return None
     mapped = wedges.lengths == 2 * polygons.lengths
     if not mapped.any() or not (mapped | (wedges.lengths == 0)).all():
@@ -169,4 +171,4 @@ def _notes(rows: PlyRows) -> list[str]:
     if textures:
         shown = ", ".join(name.strip()[:60] for name in textures[:3])
         notes.append(f"{counted(len(textures), 'texture')} not used: {shown}.")
-    return notes
+    return [*rows.notes, *notes]

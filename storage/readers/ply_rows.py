@@ -52,11 +52,13 @@ class _EndOfFileError(Exception):
 
 class PlyRows(NamedTuple):
     """``elements``, as the header has them; ``columns``, by the names of the elements and of their
-    properties, numbers (rows,) or lists; ``comments`` of the header, without that word."""
+    properties, numbers (rows,) or lists; ``comments`` of the header, without that word;
+    ``notes``, what was left out, a sentence each."""
 
     elements: list[Element]
     columns: dict[str, dict[str, NDArray[np.float64] | Lists]]
     comments: list[str]
+    notes: tuple[str, ...]
 
 
 def read_rows(file: Path) -> PlyRows:
@@ -67,14 +69,29 @@ def read_rows(file: Path) -> PlyRows:
     data = whole_file(file, "a PLY mesh")
     lines, start = _header_lines(file, data)
     header, order = _header(file, lines)
-    try:
-        body = _AsciiBody(data, start) if not order else _BinaryBody(data, start)
-        columns = {element.name: _read_element(body, element) for element in header}
-    except (_EndOfFileError, ValueError):
-        expected = "all the rows that the header announces: export it, or load it down, again"
-        raise BadInput(file, "content", "truncated or damaged", expected) from None
     comments = [line.split(None, 1)[1] for line in lines if re.match(r"comment\s+\S", line)]
-    return PlyRows(header, columns, comments)
+    body = _AsciiBody(_numbers(data, start)) if not order else _BinaryBody(data, start)
+    columns = _read_elements(body, header)
+    notes: tuple[str, ...] = ()
+    if isinstance(body, _AsciiBody) and (columns is None or not body.is_at_end()):
+        by_lines = _read_elements(_AsciiBody(_numbers_of_lines(data, start, header)), header)
+        if by_lines is not None and columns is None:
+            notes = ("Numbers at the ends of its lines left out: its header has no such.",)
+        columns = by_lines if by_lines is not None else columns
+    if columns is None:
+        expected = "all the rows that the header announces: export it, or load it down, again"
+        raise BadInput(file, "content", "truncated or damaged", expected)
+    return PlyRows(header, columns, comments, notes)
+
+
+def _read_elements(
+    body: _AsciiBody | _BinaryBody, header: list[Element]
+) -> dict[str, dict[str, NDArray[np.float64] | Lists]] | None:
+    """None where there are not as many rows, or not such, as the header says."""
+    try:
+        return {element.name: _read_element(body, element) for element in header}
+    except (_EndOfFileError, ValueError):
+        return None
 
 
 def _header_lines(file: Path, data: bytes) -> tuple[list[str], int]:
@@ -117,9 +134,12 @@ def _property(words: list[str], order: str) -> Property:
 class _AsciiBody:
     """Rows of numbers in text, up to the first word that is none; line ends do not matter."""
 
-    def __init__(self, data: bytes, start: int) -> None:
-        self._numbers = np.fromiter(_numbers(data, start), np.float64)
+    def __init__(self, numbers: Iterator[float]) -> None:
+        self._numbers = np.fromiter(numbers, np.float64)
         self.at = 0
+
+    def is_at_end(self) -> bool:
+        return self.at == len(self._numbers)
 
     def take(self, type_: np.dtype[Any], count: int) -> NDArray[np.float64]:
         if count < 0 or self.at + count > len(self._numbers):
@@ -136,12 +156,34 @@ class _AsciiBody:
 
 
 def _numbers(data: bytes, start: int) -> Iterator[float]:
-    for word in _words(data, start):
-        try:
-            value = number(word)
-        except ValueError:
-            return
-        yield value
+    """Up to the first word that is none."""
+    try:
+        for word in _words(data, start):
+            yield number(word)
+    except ValueError:
+        return
+
+
+def _numbers_of_lines(data: bytes, start: int, header: list[Element]) -> Iterator[float]:
+    """As `_numbers`, but of each row's line only as many as the header says: MeshLab's colours of
+    corners stand there under a header that promises others. Ends at a line with less."""
+    lines = filter(None, map(bytes.split, data[start:].splitlines()))
+    for element in header:
+        for _, words in zip(range(element.rows), lines, strict=False):
+            at = 0
+            for item in element.properties:
+                if item.count_type is not None:
+                    length = words[at : at + 1]
+                    if not length or not length[0].isdigit() or len(length[0]) > 9:
+                        return
+                    at += int(length[0])
+                at += 1
+            if at > len(words):
+                return
+            try:
+                yield from [number(word) for word in words[:at]]
+            except ValueError:
+                return
 
 
 def _words(data: bytes, start: int) -> Iterator[bytes]:

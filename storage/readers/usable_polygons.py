@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.polygons import MOST_CORNERS, PolygonMesh
 
+_LARGEST = 1e100  # coordinates above it are noise, and their squares are no numbers
 _LARGE_FACE = 500  # corners; what cuts them takes more than in proportion
 
 
@@ -50,6 +51,8 @@ def counted(number: int, one: str, more: str | None = None) -> str:
 
 def _without_faces(file: Path, mesh: PolygonMesh) -> BadInput:
     points = f"{len(mesh.positions)} points without faces"
+    if not len(mesh.positions):
+        return BadInput(file, "content", points, "at least one face: export it again")
     expected = (
         "at least one face; make a mesh of a point cloud first, as by screened Poisson "
         "reconstruction in MeshLab"
@@ -131,20 +134,20 @@ def _of_three_corners(file: Path, mesh: PolygonMesh, notes: list[str]) -> Polygo
 
 
 def _finite(file: Path, mesh: PolygonMesh, notes: list[str]) -> PolygonMesh:
-    wrong = ~np.asarray(np.isfinite(mesh.positions).all(axis=1))[mesh.corners]
+    wrong = ~np.asarray((np.abs(mesh.positions) < _LARGEST).all(axis=1))[mesh.corners]
     if wrong.any():
         bad = np.zeros(len(mesh.sizes), bool)
         bad[_owners(mesh)[wrong]] = True
         if bad.all():
             vertex = int(mesh.corners[np.argmax(wrong)])
             found = "(" + ", ".join(f"{value:g}" for value in mesh.positions[vertex]) + ")"
-            raise BadInput(file, f"vertex {vertex}", found, "finite numbers")
+            raise BadInput(file, f"vertex {vertex}", found, "finite numbers: export it again")
         faces = counted(int(bad.sum()), "face")
         notes.append(f"{faces} left out: positions that are no finite numbers.")
         mesh = _with_polygons(mesh, ~bad)
     if mesh.corner_uvs is not None:
         missing = np.isnan(mesh.corner_uvs).all(axis=1)
-        wrong = ~np.asarray(np.isfinite(mesh.corner_uvs).all(axis=1))
+        wrong = ~np.asarray((np.abs(mesh.corner_uvs) < _LARGEST).all(axis=1))
         if unusable := int((wrong & ~missing).sum()):
             corners = counted(unusable, "corner")
             notes.append(f"Texture coordinates of {corners} left out: no finite numbers.")
