@@ -40,6 +40,15 @@ def _quantised(kind: str, divisor: float, **entry: Any) -> Callable[[GltfWriter]
     return build
 
 
+def _packed_uvs(made: GltfWriter) -> None:
+    """Texture coordinates of 12 bits, which a texture's transform makes as large as they were."""
+    uv = made.accessor(np.round(UVS * 4096).astype(np.uint16), **_UP_TO_ONE)
+    transform = {"KHR_texture_transform": {"scale": [65535 / 4096] * 2, "offset": [0.5, 0.25]}}
+    texture = {"index": 0, "extensions": transform}
+    made.add("materials", pbrMetallicRoughness={"baseColorTexture": texture})
+    one_node(made, made.primitive(TEXCOORD_0=uv) | {"material": 0})
+
+
 def _draco(made: GltfWriter) -> None:
     import DracoPy
 
@@ -126,6 +135,10 @@ PACKED: tuple[Case, ...] = (
     built("gltf_q_bytes.glb", "quantised positions", _quantised("i1", 1)),
     built("gltf_q_norm.glb", "quantised positions", _quantised("u1", 255, **_UP_TO_ONE)),
     built("gltf_q_short.glb", "quantised positions", _quantised("<i2", 32767, **_UP_TO_ONE)),
+    built(
+        "gltf_q_uvs.glb", "texture coordinates in integers", _packed_uvs,
+        right=has_uvs(UVS + np.array([0.5, 0.25])),
+    ),
     built("gltf_draco.glb", "Draco", _draco, right=has_uvs(UVS)),
     built_refused(
         "gltf_draco_spoilt.glb", "Draco", _draco_spoilt, "damaged", "export it without compression"

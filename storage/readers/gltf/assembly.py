@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from storage.readers.gltf.accessors import Accessors
 from storage.readers.gltf.primitives import Geometry, Primitive, is_surface
+from storage.readers.gltf.quantised_uvs import unquantised
 from storage.readers.gltf.scene_tree import Group, placements
 from storage.readers.gltf.skins import joint_matrices, posed
 from storage.readers.polygons import PolygonMesh
@@ -95,25 +96,36 @@ class Assembly:
             vertices += instances * count
         all_corners = np.concatenate(corners)
         sets = sorted({number for part in placed for number in part.geometry.uvs})
-        uvs = {number: self._uvs(number, 0.0) for number in sets}
+        uvs = {number: self._uvs(number) for number in sets}
         mesh = PolygonMesh(
             np.concatenate(positions),
             np.full(len(all_corners) // 3, 3, np.int64),
             all_corners,
-            self._uvs(0, np.nan) if 0 in sets else None,
+            self._first_uvs() if 0 in sets else None,
             np.concatenate(parts) if parts else np.zeros(0, np.int64),
             self._colours(),
             notes,
         )
         return mesh, uvs
 
-    def _uvs(self, number: int, missing: float) -> NDArray[np.float64]:
+    def _uvs(self, number: int) -> NDArray[np.float64]:
         pieces = [
             part.geometry.uvs[number][part.triangles.ravel()]
             if number in part.geometry.uvs
-            else np.full((part.triangles.size, 2), missing)
+            else np.zeros((part.triangles.size, 2))
             for part in self._placed
         ]
+        return np.concatenate(pieces)
+
+    def _first_uvs(self) -> NDArray[np.float64]:
+        """Of a mesh without its materials."""
+        pieces = []
+        for part in self._placed:
+            piece = np.full((part.triangles.size, 2), np.nan)
+            if 0 in part.geometry.uvs:
+                entry, stored = self.primitives[part.row], part.geometry.uvs[0]
+                piece = unquantised(self._document, entry, stored)[part.triangles.ravel()]
+            pieces.append(piece)
         return np.concatenate(pieces)
 
     def _colours(self) -> NDArray[np.float64] | None:
