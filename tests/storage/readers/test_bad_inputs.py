@@ -19,7 +19,10 @@ READ_NONETHELESS = {
     ("broken EXIF", "photograph"),
     ("cap.obj", "mesh"),
     ("cap.obj", "scene"),
+    ("repeated.obj", "mesh"),
     ("repeated.obj", "scene"),
+    ("faces.obj", "mesh"),
+    ("faces.obj", "scene"),
     ("library", "scene"),
 }
 
