@@ -327,15 +327,16 @@ def test_bad_files_are_refused_before_any_work(
 
 
 @pytest.mark.parametrize(
-    ("value", "sentence"), [(np.nan, r"sky\.exr: .*nan"), (-1.0, r"sky\.exr: .*-1")]
+    ("value", "sentence"),
+    [(np.nan, r"sky\.exr: .*no number in 32 of 512"), (0.0, r"sky\.exr: .*all black")],
 )
 def test_an_environment_with_bad_radiance_is_refused(
     good: Any, tmp_path: Path, value: float, sentence: str
 ) -> None:
     import OpenEXR
 
-    light = np.ones((16, 32, 3), np.float32)
-    light[3, 5, 1] = value
+    light = np.zeros((16, 32, 3), np.float32)
+    light[3] = value
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with OpenEXR.File(header, {"RGB": light}) as file:
         file.write(str(tmp_path / "sky.exr"))
