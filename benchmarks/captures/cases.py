@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from benchmarks.captures import gltf, light_probes, materials, meshes, photographs, profiles
+from benchmarks.captures import (
+    databases,
+    gltf,
+    light_probes,
+    materials,
+    meshes,
+    photographs,
+    profiles,
+)
 from benchmarks.captures.case import Case
 
 CASES: dict[str, tuple[Case, ...]] = {
+    "databases": databases.CASES,
     "gltf": gltf.CASES,
     "light_probes": light_probes.CASES,
     "materials": materials.CASES,

@@ -154,7 +154,8 @@ def ordered_photographs(
     for name, angles in _photographs(names, left_out):
         for tag, (theta, _) in (("l", angles.light), ("v", angles.view)):
             if theta > 90:
-                raise BadInput(path / name, f"t{tag}", f"{theta:g} degrees", "0 to 90 degrees")
+                expected = "0 to 90 degrees: move what is below the surface out of the database"
+                raise BadInput(path / name, f"t{tag}", f"{theta:g} degrees", expected)
         pair = (angles.view, angles.light)
         first = found.setdefault(pair, name)
         styles.add(angles.style)
@@ -167,8 +168,7 @@ def ordered_photographs(
             )
         repeated.append(name)
     if not found:
-        among = f", found {_listed(left_out)}" if left_out else ""
-        raise BadInput(path, "content", "without photographs", f"files named {EXAMPLES}{among}")
+        raise _without_photographs(path, left_out)
     views, lights = _expected_directions(found.keys())
     _check_complete(path, found, views, lights, left_out)
     pairs = sorted(found)
@@ -182,6 +182,16 @@ def ordered_photographs(
         style=styles.pop() if len(styles) == 1 else OTHER,
         notes=_notes(left_out, repeated),
     )
+
+
+def _without_photographs(path: Path, names: Sequence[str]) -> BadInput:
+    expected = f"files named {EXAMPLES}"
+    packed = [name for name in names if name.lower().endswith((".zip", ".rar", ".7z", ".gz"))]
+    if packed:
+        expected += f": unpack {_listed(packed)}"
+    elif names:
+        expected += f", found {_listed(names)}"
+    return BadInput(path, "content", "without photographs", expected)
 
 
 def _photographs(names: Iterable[str], left_out: list[str]) -> Iterator[tuple[str, PhotographName]]:
