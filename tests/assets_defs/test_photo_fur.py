@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from assets_defs.launcher import LaunchError, Request
 from assets_defs.photo_fur.datasets import LOADERS
@@ -77,6 +78,34 @@ def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
     )
     np.testing.assert_array_equal(stack.layer, found.layer)
     np.testing.assert_array_equal(stack.masks, found.masks)
+
+
+def test_a_cut_out_goes_through_the_whole_graph(good: Any) -> None:
+    """Its transparent part is bright: taken for fur, it would be the tips."""
+    random = np.random.default_rng(5)
+    codes = random.integers(30, 160, (80, 96, 4)).astype(np.uint8)
+    codes[..., 3] = 255
+    codes[:, :24] = (255, 255, 255, 0)
+    inbox = good.workspace.inbox("photo_fur")
+    inbox.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(codes).save(inbox / "cut.png")
+    good.launcher.launch(Request(FUR, [KEYS | {"photo": "cut-png"}], preset="test"))
+    store = good.workspace.store
+    photo = store.open(Slot("photo_fur", "fur_photo", "cut-png"))
+    opaque = np.broadcast_to(np.arange(96) >= 24, (80, 96))
+    np.testing.assert_array_equal(photo["opaque"].values, opaque)
+    assert not photo["radiance"].values[:, :24].any()
+    medium = store.open(Slot("photo_fur", "attenuation", "cut-png"))
+    assert int(medium["histogram"].sum()) == opaque.sum()
+    assert float(medium["brightest"]) < 0.4
+    stack = store.open(Slot("photo_fur", "shell_stack", "cut-png"))
+    np.testing.assert_array_equal(stack["layer"].values > 0, opaque)
+    assert not stack["mask"].values[:, :, :24].any()
+    frames = store.open(Slot("photo_fur", "fur_frames", "square.cut-png"))
+    assert float(frames["coverage"][0]) == pytest.approx(0.75, abs=1e-9)
+    slot = Slot("photo_fur", "fur_photo", "cut-png")
+    notes = store.record(slot, store.current(slot))["notes"]
+    assert notes == ["25 % of the pixels are transparent and were left out."]
 
 
 def test_a_second_launch_makes_nothing_and_a_forced_one_everything(good: Any) -> None:

@@ -229,6 +229,23 @@ def test_the_masks_are_a_partition(cut: Cut, tails: Tails) -> None:
 
 
 @settings(deadline=None)
+@given(cuts(), st.sampled_from(TAILS), st.integers(0, 9))
+def test_transparent_pixels_are_in_no_layer_and_others_where_they_were(
+    cut: Cut, tails: Tails, seed: int
+) -> None:
+    opaque = np.random.default_rng(seed).random(cut.luminance.shape) < 0.6
+    stack = make_shell_stack(cut.luminance, cut.medium, cut.layers, tails=tails, opaque=opaque)
+    whole = make_shell_stack(cut.luminance, cut.medium, cut.layers, tails=tails)
+    np.testing.assert_array_equal(stack.layer, np.where(opaque, whole.layer, 0))
+    np.testing.assert_array_equal(stack.masks, whole.masks & opaque)
+    code = depth_code(cut.luminance, cut.medium, cut.layers, tails=tails, opaque=opaque)
+    assert (code[~opaque] == DROPPED).all()
+    np.testing.assert_array_equal(
+        code[opaque], depth_code(cut.luminance, cut.medium, cut.layers, tails=tails)[opaque]
+    )
+
+
+@settings(deadline=None)
 @given(cuts(), st.sampled_from(TAILS))
 def test_a_stack_holds_the_layers_and_their_masks(cut: Cut, tails: Tails) -> None:
     stack = make_shell_stack(cut.luminance, cut.medium, cut.layers, tails=tails)

@@ -141,6 +141,25 @@ def test_step_error_is_the_largest_distance_from_equation_3() -> None:
 # ---- the pictures ----------------------------------------------------------------------------
 
 
+def test_transparent_pixels_must_be_in_no_layer_and_are_not_looked_at_from_above() -> None:
+    luminance = np.linspace(0.2, 0.9, 100).reshape(10, 10)
+    opaque = np.ones((10, 10), bool)
+    opaque[:2] = False
+    layer, masks = make_shell_stack(luminance, MEDIUM, 6, tails="end layers", opaque=opaque)
+    boundaries = MEDIUM.boundaries(6)
+    assert partition_error(layer, masks, opaque) == 0.0
+    assert interval_error(layer, luminance, boundaries, "end layers", opaque) == 0.0
+    wrong, masks = make_shell_stack(luminance, MEDIUM, 6, tails="end layers")
+    assert partition_error(wrong, masks, opaque) == 0.2
+    assert interval_error(wrong, luminance, boundaries, "end layers", opaque) == 0.2
+    assert interval_error(layer, luminance, boundaries, "end layers") == 0.2
+    picture = np.zeros((10, 10, 3), np.uint8)
+    light = np.zeros((10, 10, 3))
+    light[:2] = 1.0
+    assert top_view_rmse(picture, light, opaque) == 0.0
+    assert top_view_rmse(picture, light) > 0.4
+
+
 def test_top_view_rmse_is_the_rmse_of_the_codes() -> None:
     rng = np.random.default_rng(15)
     radiance = rng.random((4, 5, 3)).astype(np.float32)

@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.photo_fur.attenuation import fit_attenuation
-from pipelines.photo_fur.photograph import HIGHLIGHT_SHARE, expose, fit_size, fur_photograph
+from pipelines.photo_fur.photograph import (
+    HIGHLIGHT_SHARE,
+    expose,
+    fit_cutout,
+    fit_size,
+    fur_photograph,
+)
 
 
 def test_a_photograph_inside_the_display_stays_as_it_is() -> None:
@@ -46,6 +52,15 @@ def test_a_few_lights_clip_and_brighten_nothing_else() -> None:
     exposed = expose(radiance)
     np.testing.assert_array_equal(exposed[3, 4], [1.0, 1.0, 0.5])
     assert exposed[0, 0, 0] == 0.25
+
+
+def test_transparent_pixels_have_no_say_in_the_exposure() -> None:
+    radiance = np.full((50, 50, 3), 0.25, np.float32)
+    radiance[:, :20] = 90.0
+    opaque = np.ones((50, 50), bool)
+    opaque[:, :20] = False
+    assert expose(radiance, opaque)[0, 30, 0] == 0.25
+    assert expose(radiance)[0, 30, 0] < 0.01
 
 
 # ---- size ------------------------------------------------------------------------------------
@@ -114,3 +129,24 @@ def test_a_photograph_gets_its_luminance_and_the_medium_of_that(tail: float) -> 
     expected = radiance.astype(float) @ [0.2126, 0.7152, 0.0722]
     np.testing.assert_allclose(photograph.luminance, expected, rtol=1e-6)
     assert photograph.attenuation == fit_attenuation(photograph.luminance, tail=tail)
+
+
+@pytest.mark.parametrize("factor", [2, 5])
+def test_a_cut_out_is_reduced_by_its_opaque_pixels_alone(factor: int) -> None:
+    random = np.random.default_rng(3)
+    radiance = random.random((4 * factor, 6 * factor, 3)).astype(np.float32)
+    opaque = random.random((4 * factor, 6 * factor)) < 0.55
+    light, left = fit_cutout(radiance, opaque, 6)
+    for row, column in np.ndindex(4, 6):
+        block = np.s_[row * factor : (row + 1) * factor, column * factor : (column + 1) * factor]
+        assert left[row, column] == (opaque[block].mean() >= 0.5)
+        expected = radiance[block][opaque[block]].mean(axis=0) if left[row, column] else 0
+        np.testing.assert_allclose(light[row, column], expected, atol=1e-6)
+
+
+def test_a_small_cut_out_stays_as_it_is() -> None:
+    radiance = np.random.default_rng(4).random((20, 30, 3)).astype(np.float32)
+    opaque = radiance[..., 0] > 0.3
+    light, left = fit_cutout(radiance, opaque, 64)
+    np.testing.assert_array_equal(left, opaque)
+    np.testing.assert_array_equal(light, np.where(opaque[..., None], radiance, 0))

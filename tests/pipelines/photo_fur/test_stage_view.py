@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, Wrap, orbit
 from pipelines.photo_fur.attenuation import (
+    DROPPED,
     Attenuation,
     Tails,
     layer_masks,
@@ -367,6 +368,29 @@ def test_coverage_is_the_share_of_pixels_that_are_not_background() -> None:
     kept = layer_of(photo.luminance, photo.attenuation, 5, tails="dropped") > 0
     exact = frames_of(photo, flat_skin(), SQUARE_VIEWS[:1], tails="dropped").coverage[0]
     assert exact == kept.mean()
+
+
+@pytest.mark.parametrize("fill", FILLS)
+def test_of_a_cut_out_only_what_is_opaque_is_drawn(fill: Fill) -> None:
+    photo = random_photograph(19)
+    opaque = np.random.default_rng(19).random((SIZE, SIZE)) < 0.5
+    hidden = np.where(opaque[..., None], photo.radiance, 0).astype(np.float32)
+    picture = drawn(fur(photo._replace(radiance=hidden, opaque=opaque), 5, fill=fill))
+    np.testing.assert_array_equal(picture[..., 3] > 0, opaque)
+    whole = drawn(fur(photo, 5, fill=fill))
+    np.testing.assert_array_equal(picture[opaque], whole[opaque])
+
+
+def test_the_texture_of_a_cut_out_goes_on_with_the_nearest_colour() -> None:
+    photo = random_photograph(20)
+    opaque = np.ones((SIZE, SIZE), bool)
+    opaque[:, :5] = False
+    hidden = np.where(opaque[..., None], photo.radiance, 0).astype(np.float32)
+    image = fur_texture(photo._replace(radiance=hidden, opaque=opaque), 5, tails="end layers")
+    edge = to_8bit(photo.radiance)[:, 5:6]
+    np.testing.assert_array_equal(image[:, :5, :3], np.broadcast_to(edge, (SIZE, 5, 3)))
+    assert (image[:, :5, 3] == DROPPED).all()
+    assert (image[:, 5:, 3] != DROPPED).all()
 
 
 def sphere(segments: int = 48) -> Skin:
