@@ -287,6 +287,61 @@ def test_all_6561_headers_are_read(tmp_path: Path) -> None:
     assert "size is 8 x 8 pixels; expected 9 x 8 pixels as in the other files" in text
 
 
+def test_a_database_may_be_in_parts(tmp_path: Path) -> None:
+    files = list(png_files().items())
+    (tmp_path / "wood" / "more").mkdir(parents=True)
+    write_zip(tmp_path / "wood" / "one.zip", dict(files[:2]))
+    write_zip(tmp_path / "wood" / "more" / "two.ZIP", dict(files[2:]) | {"readme.txt": b"UTIA"})
+    (tmp_path / "wood" / "overview.jpg").write_bytes(b"no picture")
+    btf = open_btf(tmp_path / "wood")
+    np.testing.assert_allclose(whole(pickle.loads(pickle.dumps(btf))), light_of_codes(codes()))
+    (note,) = btf.notes
+    assert note == "1 file (readme.txt) was left out: no photographs of a pair."
+
+
+def test_links_to_folders_are_followed_but_not_round_in_circles(tmp_path: Path) -> None:
+    write_folder(tmp_path / "store", png_files())
+    (tmp_path / "wood").mkdir()
+    (tmp_path / "wood" / "link").symlink_to(tmp_path / "store")
+    (tmp_path / "wood" / "link again").symlink_to(tmp_path / "store")
+    (tmp_path / "store" / "back").symlink_to(tmp_path / "wood")
+    btf = open_btf(tmp_path / "wood")
+    assert btf.notes == ()
+    np.testing.assert_allclose(whole(btf), light_of_codes(codes()), rtol=1e-6)
+
+
+def test_any_photograph_that_is_transparent_is_refused_when_it_is_read(tmp_path: Path) -> None:
+    alpha = np.full((*codes().shape[:3], 1), 255, np.uint8)
+    alpha[4, 2, 3] = 254
+    stored = np.concatenate([codes(), alpha], axis=-1)
+    files = {
+        utia_name(*pair): png_bytes(image, 6) for pair, image in zip(PAIRS, stored, strict=True)
+    }
+    path = write_zip(tmp_path / "wood.zip", files)
+    btf = open_btf(path)
+    assert btf.notes == ("6 photographs have an opaque alpha channel, which was left out.",)
+    np.testing.assert_allclose(btf.read(0, 4), light_of_codes(codes()[:4]), rtol=1e-6)
+    text = refusal(lambda: btf.read(4, 5), os.path.basename(utia_name(*PAIRS[4])))
+    assert "alpha channel is not opaque at 1.4%" in text
+    open_btf(path, (4, 0, 5, HEIGHT)).read(0, 6)  # beside it
+
+
+@pytest.mark.parametrize("utia", [True, False])
+def test_what_exr_do_not_say_is_told_with_the_setting(tmp_path: Path, utia: bool) -> None:
+    stored = (hdr_light() @ xyz_of_linear_rgb().T).astype(np.float16)
+    files = exr_files(stored, "RGB")
+    if not utia:
+        files = {f"wood/{name.split('/')[1]}".replace("_", "-"): d for name, d in files.items()}
+    btf = open_btf(write_folder(tmp_path / "wood", files))
+    (note,) = btf.notes
+    taken, other = ("CIE XYZ", "rgb") if utia else ("linear sRGB", "xyz")
+    assert f"taken as {taken}" in note
+    assert note.endswith(f"set exr_colours to {other}.")
+    set_by_hand = open_btf(tmp_path / "wood", exr_colours="xyz")
+    assert set_by_hand.notes == ()
+    np.testing.assert_allclose(whole(set_by_hand), hdr_light(), atol=0.05)
+
+
 # --- What is refused before any work ------------------------------------------------------------
 
 XYZ = hdr_light().astype(np.float16)[0]

@@ -229,7 +229,7 @@ def test_cut_short_anywhere(tmp_path: Path) -> None:
         ({"version": 0}, "header version is 0"),
         ({"header_size": 99}, "header size is 99 bytes; expected 305 bytes by its content"),
         ({"channel_names": [b"450", b"550"]}, "number of channels is 2; expected 3 (RGB)"),
-        ({"model": 3}, "colour model is 3 (PCA); expected 0 (RGB) or 11 (log Y, U/Y, V/Y)"),
+        ({"model": 2}, "colour model is 2 (LAB); expected one of 0 (RGB), 1 (YUV), 3 (PCA)"),
         ({"model": -1}, "colour model is -1 (unknown)"),
     ],
 )
