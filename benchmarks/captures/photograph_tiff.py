@@ -278,6 +278,13 @@ _CONTENTS = (
         lambda path: _pages(path, (_preview(), {"subfiletype": 1}), (_PLAIN, {})),
     ),
     _case(
+        "page_below.tif",
+        _PAGES,
+        is_light(light_of(_PLAIN)),
+        lambda path: _save_below(path),
+        "pages below",
+    ),
+    _case(
         "imagej_stack.tif",
         _PAGES,
         is_light(light_of(_GREY)),
@@ -294,6 +301,14 @@ _CONTENTS = (
         for orientation in (2, 5, 6, 7)
     ),
 )
+
+
+def _save_below(path: Path) -> None:
+    import tifffile
+
+    with tifffile.TiffWriter(path) as writer:
+        writer.write(_PLAIN, photometric="rgb", subifds=1)
+        writer.write(_PLAIN[::2, ::2], photometric="rgb", subfiletype=0)
 
 
 def _save_imagej(path: Path) -> None:

@@ -70,7 +70,7 @@ def read_tiff(file: Path) -> StoredPicture:
 def _refuse_raw(file: Path, page: tifffile.TiffPage) -> None:
     with file.open("rb") as stream:
         is_raw = stream.read(10)[8:] == b"CR" or _DNG_VERSION in page.tags
-    is_raw |= page.photometric in _RAW or _has_raw_below(page)
+    is_raw |= any(each.photometric in _RAW for each in (page, *_pages_below(page)))
     if is_raw:
         raise BadInput(
             file,
@@ -80,14 +80,13 @@ def _refuse_raw(file: Path, page: tifffile.TiffPage) -> None:
         )
 
 
-def _has_raw_below(page: tifffile.TiffPage) -> bool:
+def _pages_below(page: tifffile.TiffPage) -> list[Any]:
     if not page.subifds:
-        return False
+        return []
     try:
-        pages: Any = page.pages or ()
-        return any(below.photometric in _RAW for below in pages)
+        return list(page.pages or ())
     except Exception:  # a broken page below is no reason to refuse this one
-        return False
+        return []
 
 
 def _check_complete(file: Path, tiff: tifffile.TiffFile, page: tifffile.TiffPage) -> None:
@@ -135,6 +134,8 @@ def _left_out(page: tifffile.TiffPage) -> list[str]:
     notes = []
     if _LAYERS in page.tags:
         notes.append("Layers of Photoshop were left out: the flattened picture was read.")
+    if any(not below.subfiletype & (_REDUCED | _MASK) for below in _pages_below(page)):
+        notes.append("Pages below the first were left out.")
     extra = page.samplesperpixel - _COLOURS[int(page.photometric)]
     alphas = sum(kind in (_ASSOCIATED, _UNASSOCIATED) for kind in page.extrasamples[:1])
     if extra > alphas:
