@@ -63,7 +63,7 @@ def read_for_glass(path: Path) -> Blown:
         closed = make_closed_mesh(vertices, triangles)
     except ValueError as error:
         found, _, expected = str(error).partition("; expected ")
-        raise BadInput(path, "the mesh", found, expected) from error
+        raise BadInput(path, "the mesh", found.removeprefix("the mesh is "), expected) from error
     return Blown(closed.vertices, closed.triangles, (*notes, *closed.notes))
 
 

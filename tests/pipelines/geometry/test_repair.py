@@ -366,6 +366,67 @@ def test_crowds_of_vertices_are_thinned(monkeypatch: pytest.MonkeyPatch) -> None
         assert len(set(group[place == number])) == 1
 
 
+# --- Open bodies --------------------------------------------------------------------------------
+
+
+def ball_without(share: float) -> tuple[Array, Rows]:
+    """A ball whose lowest triangles are missing, a share of all."""
+    ball = trimesh.creation.icosphere(3)
+    height = ball.triangles_center[:, 2]
+    return np.array(ball.vertices), np.array(ball.faces)[height > np.quantile(height, share)]
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    share=st.floats(0.001, 0.03),
+    turned=st.booleans(),
+    mixed=st.booleans(),
+    size=st.sampled_from([1e-7, 1.0, 1e7]),
+    seed=st.integers(0, 99),
+)
+def test_a_body_with_small_holes_faces_outwards(
+    share: float, turned: bool, mixed: bool, size: float, seed: int
+) -> None:
+    vertices, triangles = ball_without(share)
+    given_ = triangles[:, ::-1] if turned else triangles.copy()
+    if mixed:
+        some = np.random.default_rng(seed).random(len(given_)) < 0.3
+        given_[some] = given_[some, ::-1]
+    mesh = repair_mesh(vertices * size + [0, 0, 9 * size], given_)
+    a, b, c = np.moveaxis((mesh.vertices / size - [0, 0, 9])[mesh.triangles], 1, 0)
+    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), a) > 0).all()
+    words = f"{len(triangles)} triangles of pieces with small openings turned over"
+    assert any(words in note for note in mesh.notes) == (turned and not mixed)
+    assert_not_changed_by(mesh, repair_mesh(mesh.vertices, mesh.triangles))
+
+
+@pytest.mark.parametrize("name", ["bowl", "open box", "sheet"])
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_is_looked_into_faces_as_it_did(name: str, turned: bool) -> None:
+    """Half a ball, a box without its lid, into which one may look from inside a room, a sheet."""
+    vertices, triangles = CUBE, CUBE_TRIANGLES[(CUBE[CUBE_TRIANGLES][:, :, 2] < 1).any(axis=1)]
+    if name == "bowl":
+        vertices, triangles = ball_without(0.5)
+    if name == "sheet":
+        flat = shapes.square(3)
+        vertices, triangles = flat.vertices, flat.triangles.astype(np.int64)
+    given_ = triangles[:, ::-1] if turned else triangles
+    mesh = repair_mesh(vertices, given_)
+    np.testing.assert_array_equal(mesh.vertices[mesh.triangles], vertices[given_])
+
+
+def test_given_corners_are_found_again() -> None:
+    """Across what was merged, dropped and turned over."""
+    random = np.random.default_rng(3)
+    apart = CUBE[CUBE_TRIANGLES].reshape(-1, 3)
+    rows = np.arange(36).reshape(-1, 3)
+    rows[::2] = rows[::2, ::-1]
+    given_ = np.concatenate([rows, rows[random.integers(0, 12, 5)], [[0, 1, 1]]])
+    mesh = repair_mesh(apart, given_)
+    np.testing.assert_array_equal(mesh.vertices[mesh.triangles], apart[mesh.corners])
+    np.testing.assert_array_equal(np.sort(mesh.corners), np.sort(given_[mesh.kept]))
+
+
 # --- What is dropped ----------------------------------------------------------------------------
 
 

@@ -118,7 +118,7 @@ def test_gaps_far_below_the_size_are_none(gap: float, size: float) -> None:
 
 
 def test_gaps_that_are_seen_are_open() -> None:
-    with pytest.raises(ValueError, match="open along 36 border edges.*fill its holes"):
+    with pytest.raises(ValueError, match=r"open along 36 border edges.*fill its holes"):
         make_closed_mesh(*split_cube(1e-3, np.zeros((0, 3), np.int64)))
 
 
