@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import struct
 import tempfile
 import zipfile
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from benchmarks.captures.probe_files import by_pixel, hdr, luminance_chroma, rgbe
 
 SPECIAL = ("folder", "pipe", "socket", "device")
 """What a case's file may be instead of bytes."""
@@ -40,17 +43,21 @@ def valid_cases() -> list[Case]:
         "mesh.mtl": b"newmtl a\nKd .5 .25 1\nKs .1 .1 .1\nNs 30\nnewmtl b\nKd 1 0 0\nPr .4\n"
     }
     encoded = pictures(64, 66)
-    lights = {**_radiance_pictures(16, 8), "light.exr": _exr(16, 8, "RGB", np.float32)}
+    lights = {**_radiance_pictures(16, 8), "light.exr": _exr(16, 8, "RGB", np.float32)} | {
+        "older.hdr": hdr(pixels=b"".join(map(by_pixel, rgbe()))),
+        "chroma.exr": luminance_chroma(),
+    }
     profiles = {
         "commas.csv": b"v,n\n" + b"".join(b"%d,%d.5\n" % (v, v % 3) for v in range(12)),
         "semicolons.csv": b"# v [um]; n [um]\n0,5; 0\n1,5; -0,25\n2; -1e-1\n3; 0\n",
     }
     return [
         *(Case(name, "photograph", name, {name: data}) for name, data in encoded.items()),
-        *_photographs_people_have(),
+        *_people_have("photographs", "photograph"),
         *(Case(name, "environment", name, {name: data}) for name, data in lights.items()),
         *(Case(name, "mesh", name, {name: data}) for name, data in meshes.items()),
         *(Case(name, "scene", name, {name: data, **library}) for name, data in meshes.items()),
+        *_people_have("gltf", "mesh", ".glb"),
         *(Case(name, "profile", name, {name: data}) for name, data in profiles.items()),
         *_btf_cases(),
         drive("png"),
@@ -58,18 +65,21 @@ def valid_cases() -> list[Case]:
     ]
 
 
-def _photographs_people_have() -> list[Case]:
-    """One of each kind of ``benchmarks.captures.photographs`` that is read."""
+def _people_have(group: str, reader: str, ending: str = "") -> list[Case]:
+    """One of each kind of a group of ``benchmarks.captures`` that is read."""
     from benchmarks.captures.case import write_file
-    from benchmarks.captures.photographs import CASES
+    from benchmarks.captures.cases import CASES
 
-    kinds = {case.kind: case for case in CASES if case.ends != "refused" and case.write}
-    with tempfile.TemporaryDirectory() as folder:
-        written = [write_file(case, Path(folder)) for case in kinds.values()]
-        return [
-            Case(path.name, "photograph", path.name, {path.name: path.read_bytes()})
-            for path in written
-        ]
+    found = {}
+    for case in CASES[group]:
+        if case.ends != "refused" and case.write and case.file.endswith(ending):
+            with tempfile.TemporaryDirectory() as folder:
+                path = write_file(case, Path(folder))
+                if len(os.listdir(folder)) == 1:  # without files beside it
+                    found[case.kind] = Case(
+                        path.name, reader, path.name, {path.name: path.read_bytes()}
+                    )
+    return list(found.values())
 
 
 def glb(description: Any, body: bytes) -> bytes:

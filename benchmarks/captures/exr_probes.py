@@ -17,9 +17,9 @@ from benchmarks.captures.probe_files import (
     exr,
     exr_parts,
     light,
+    luminance_chroma,
     met,
     probe,
-    raw_exr,
     rgb,
     saved,
     window,
@@ -246,15 +246,6 @@ _LAYERS = (
 # --- Grey, luminance and chroma -----------------------------------------------------------------
 
 
-def _luminance_chroma() -> bytes:
-    """Y for every pixel, RY and BY for every second one (Rec. 709's weights)."""
-    red, green, blue = np.moveaxis(light(), -1, 0)
-    luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
-    chroma = [((colour - luminance) / luminance)[::2, ::2] for colour in (red, blue)]
-    planes = {"Y": (1, luminance), "RY": (2, chroma[0]), "BY": (2, chroma[1])}
-    return raw_exr({name: (step, p.astype(np.float16)) for name, (step, p) in planes.items()})
-
-
 def _chroma_is_right(found: Any) -> bool:
     """Where chroma is stored colours are those that were; in between, luminance is."""
     weights = np.array([0.2126, 0.7152, 0.0722])
@@ -267,7 +258,7 @@ _LUMINANCE = (
     probe(
         "luminance_chroma.exr",
         "luminance and chroma",
-        saved(_luminance_chroma),
+        saved(luminance_chroma),
         is_right=_chroma_is_right,
     ),
     probe(

@@ -104,7 +104,7 @@ def _words(name: str) -> str:
 def _space(name: str, given: NDArray[np.float64]) -> ColourSpace:
     if name == "sRGB":
         return LINEAR_SRGB
-    to_srgb: NDArray[np.float64] = np.linalg.inv(_to_xyz(np.array(SRGB)))
+    to_srgb = np.asarray(np.linalg.inv(_to_xyz(np.array(SRGB))), np.float64)
     if name == "CIE XYZ":
         return ColourSpace(name, to_srgb)
     adapted = _adaptation(given[6:], np.array(_D65)) @ _to_xyz(given)

@@ -51,7 +51,7 @@ _OTHER_SIGNATURES = {
     b"\0\0\0\x0cJXL ": ("JPEG XL", _CONVERTED),
 }
 _LONGEST_HEADER = 1_000_000  # bytes of a Radiance header; the usual ones have some hundred
-_PIXEL_BYTES = 40
+_PIXEL_BYTES = 32  # while a picture is decoded and mended
 _NEARLY = 0.01  # by which width may differ from twice the height
 
 

@@ -120,7 +120,7 @@ def exr_header(file: Path) -> ExrHeader:
     header = headers[layer.part]
     left, top, right, bottom = header["displayWindow"]
     width, height = right - left, bottom - top
-    check_area(file, width, height, 12)
+    check_area(file, width, height, 4)
     _check_all(file, headers)
     stored = _inside(file, header["dataWindow"], header["displayWindow"])
     space, weights = _colours(file, header, headers[0])

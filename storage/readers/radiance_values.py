@@ -20,15 +20,15 @@ def mended(file: Path, light: NDArray[Any]) -> tuple[NDArray[np.float32], tuple[
 
     ``light`` is (height, width, channels), equirectangular. Values that are no number become the
     mean of those around (the left edge being beside the right one), infinite ones the half's
-    largest, negative ones 0.
+    largest, negative ones 0; in place, where the array is of float32.
 
     Raises BadInput where more than a hundredth of the texels are no number, or more than half
     negative, and for a picture that is all black.
     """
     notes = []
     with np.errstate(over="ignore"):  # a double beyond float32 becomes infinite
-        light = light.astype(np.float32)
-    missing = np.isnan(light) | np.isneginf(light)
+        light = light.astype(np.float32, copy=False)
+    missing = ~(light > -np.inf)
     if missing.any():
         count = _texels(missing)
         _check_share(file, "no number", count, missing, _MOST_MISSING)
