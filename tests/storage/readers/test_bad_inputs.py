@@ -24,6 +24,10 @@ READ_NONETHELESS = {
     ("faces.obj", "mesh"),
     ("faces.obj", "scene"),
     ("library", "scene"),
+    ("nodes.glb", "mesh"),
+    ("nodes.glb", "scene"),
+    ("chain.glb", "mesh"),
+    ("chain.glb", "scene"),
 }
 
 
