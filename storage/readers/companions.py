@@ -105,10 +105,12 @@ def _lines_with(data: bytes, word: bytes) -> Iterator[str]:
 def _located(file: Path, words: tuple[str, ...], *, several: bool) -> list[Path]:
     """The files that a line names: one whose name may have spaces; else ``several``, apart by
     spaces, or one behind options (``-s 1 1 1``)."""
-    whole = file_beside(file, " ".join(words))
-    if whole is not None:
-        return [whole]
+    for name in (" ".join(words), " ".join(words).strip("\"'")):  # some write it in quotes
+        whole = file_beside(file, name)
+        if whole is not None:
+            return [whole]
     if several:
         return [there for word in words if (there := file_beside(file, word)) is not None]
-    tails = (file_beside(file, " ".join(words[start:])) for start in range(1, len(words)))
+    ends = (" ".join(words[start:]).strip("\"'") for start in range(1, len(words)))
+    tails = (file_beside(file, name) for name in ends)
     return [there for there in tails if there is not None][:1]

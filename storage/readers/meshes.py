@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
+from storage.readers.companions import companions
 from storage.readers.gltf import read_gltf
 from storage.readers.obj_files import read_obj
 from storage.readers.opening import first_bytes
 from storage.readers.ply_files import read_ply
 from storage.readers.polygons import PolygonMesh, triangulate
 from storage.readers.stl_files import is_stl, read_stl
-from storage.readers.usable_polygons import usable_polygons
+from storage.readers.usable_polygons import counted, usable_polygons
 
 FORMATS = "a PLY, OBJ, STL or glTF mesh"
 
@@ -62,22 +63,34 @@ def read_mesh(path: str | PathLike[str]) -> MeshFile:
     vertices that do not exist.
     """
     file = Path(path)
-    mesh = usable_polygons(file, read_polygons(file))
+    polygons, pictures = _read(file)
+    mesh = usable_polygons(file, polygons)
     notes = list(mesh.notes)
+    if pictures:
+        notes.append(f"{counted(pictures, 'texture')} not used: only the shape is.")
     if mesh.corner_colours is not None:
         notes.append("Colours of its vertices are not used.")
     triangles, _ = triangulate(mesh.positions, mesh.sizes, mesh.corners)
-    return MeshFile(*split_by_uv(mesh, triangles), tuple(notes))
+    printable = ("".join(c if c.isprintable() else "?" for c in note) for note in notes)
+    return MeshFile(*split_by_uv(mesh, triangles), tuple(printable))
 
 
 def read_polygons(file: Path) -> PolygonMesh:
     """The polygons of a file, as they are; raises BadInput as `read_mesh`, but for the mesh."""
+    return _read(file)[0]
+
+
+def _read(file: Path) -> tuple[PolygonMesh, int]:
+    """The polygons, and how many pictures the file has for its materials."""
     found = mesh_format(file)
     if found == "gltf":
-        return read_gltf(file).mesh
+        gltf = read_gltf(file)
+        return gltf.mesh, len(gltf.document.get("images") or ())
     if found == "obj":
-        return read_obj(file).mesh
-    return read_ply(file) if found == "ply" else read_stl(file)
+        obj = read_obj(file)
+        beside = companions(file) if obj.libraries else []
+        return obj.mesh, sum(path.suffix.lower() != ".mtl" for path in beside)
+    return read_ply(file) if found == "ply" else read_stl(file), 0  # PLY says its textures itself
 
 
 def mesh_format(file: Path) -> Literal["ply", "obj", "stl", "gltf"]:

@@ -68,6 +68,8 @@ def test_textures_travel_with_their_library(tmp_path: Path) -> None:
         "map_Kd tex/brick wall.png": "mats/tex/brick wall.png",
         "map_Bump -bm 0.5 -s 1 1 1 bump.png": "mats/bump.png",
         "norm n.png": "mats/n.png",
+        'map_Kd "a b.png"': "mats/a b.png",
+        "map_Ks -clamp on 'c d.png'": "mats/c d.png",
         "map_Ks missing.png": None,
         "Kd 1 0 0": None,
     }

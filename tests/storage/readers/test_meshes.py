@@ -243,6 +243,16 @@ def test_glb_nodes_are_placed_and_joined(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.uvs[:, 1], mesh.vertices[:, 1] * 0.5, atol=1e-6)
 
 
+def test_textures_that_a_shape_does_not_need_are_said(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd oak.png\nmap_Ks gone.png\n")
+    (tmp_path / "oak.png").write_bytes(b"picture")
+    obj = tmp_path / "a.obj"
+    obj.write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert read_mesh(obj).notes == ("1 texture not used: only the shape is.",)
+    (tmp_path / "oak.png").unlink()
+    assert read_mesh(obj).notes == ()
+
+
 def test_glb_where_one_mesh_has_no_texture_coordinates(tmp_path: Path) -> None:
     nodes: list[dict[str, Any]] = [{"mesh": 0}, {"mesh": 1, "translation": [3, 0, 0]}]
     (tmp_path / "some.glb").write_bytes(glb_bytes(nodes, (True, False)))
