@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from benchmarks.captures.photograph_files import (
     is_light,
     light_of,
     noise,
+    png,
+    png_chunk,
     save_png,
     slope,
     stored_as,
@@ -46,6 +49,10 @@ def _case(
 ) -> Case:
     ending: Ending = ends or ("told" if says else "read")
     return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
+
+
+def _save(data: bytes) -> Writer:
+    return lambda path: path.write_bytes(data)
 
 
 # ---- PNG ---------------------------------------------------------------------------------------
@@ -155,6 +162,19 @@ _PNGS = (
         save_png(_DEEP, 2, (b"sBIT", b"\x0a\x0a\x0a")),
     ),
     _case(
+        "text_damaged.png",
+        "PNG: a chunk beside the picture is damaged",
+        is_light(light_of(_PLAIN)),
+        _save(png(_PLAIN, 2, (b"tEXt", b"a\0bcd")).replace(b"a\0bcd", b"a\0bXd")),
+        "checksum were left out: tEXt",
+    ),
+    _case(
+        "interlaced.png",
+        "PNG: interlaced",
+        is_light(light_of(_PLAIN)),
+        lambda path: _save(_interlaced(_PLAIN))(path),
+    ),
+    _case(
         "animated.png",
         _ANIMATION,
         is_light(light_of(_PLAIN)),
@@ -178,6 +198,19 @@ _PNGS = (
         *_HOLES,
     ),
 )
+
+
+def _interlaced(codes: NDArray[np.uint8]) -> bytes:
+    """Seven pictures of every so manieth pixel (PNG, third edition, 8)."""
+    passes = [(0, 8, 0, 8), (0, 8, 4, 8), (4, 8, 0, 4), (0, 4, 2, 4), (2, 4, 0, 2), (0, 2, 1, 2)]
+    rows = b"".join(
+        b"\0" + row.tobytes()
+        for top, down, left, across in [*passes, (1, 2, 0, 1)]
+        for row in codes[top::down, left::across]
+    )
+    header = struct.pack(">IIBBBBB", codes.shape[1], codes.shape[0], 8, 2, 0, 0, 1)
+    parts = ((b"IHDR", header), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(png_chunk(*part) for part in parts)
 
 
 def _save_frames(path: Path, **options: Any) -> None:
@@ -240,19 +273,19 @@ _JPEGS = (
         "progressive.jpg",
         "JPEG: codings",
         _SMOOTH,
-        lambda path: path.write_bytes(_jpeg(progressive=True)),
+        _save(_jpeg(progressive=True)),
     ),
     _case(
         "grey.jpg",
         "JPEG: codings",
         is_light(light_of(_SLOPE[..., 1:2]), _LOSSY),
-        lambda path: path.write_bytes(_jpeg(_SLOPE[..., 1:2])),
+        _save(_jpeg(_SLOPE[..., 1:2])),
     ),
     _case(
         "rgb.jpg",
         "JPEG: codings",
         _SMOOTH,
-        lambda path: path.write_bytes(_jpeg(keep_rgb=True)),
+        _save(_jpeg(keep_rgb=True)),
     ),
     _case(
         "bits_12.jpg",
@@ -277,9 +310,7 @@ _JPEGS = (
             f"turned_{orientation}.jpg",
             "turned upright: JPEG",
             _SMOOTH,
-            lambda path, orientation=orientation: path.write_bytes(  # type: ignore[misc]
-                _jpeg(stored_as(_SLOPE, orientation), exif=b"Exif\0\0" + exif(orientation))
-            ),
+            _save(_jpeg(stored_as(_SLOPE, orientation), exif=b"Exif\0\0" + exif(orientation))),
         )
         for orientation in (3, 6, 8)
     ),
@@ -347,7 +378,7 @@ _JPEGS = (
         "truncated.jpg",
         "a truncated file",
         None,
-        lambda path: path.write_bytes(_jpeg()[:-700]),
+        _save(_jpeg()[:-700]),
         "truncated or damaged",
         "copy or save it again",
         ends="refused",

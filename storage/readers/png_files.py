@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,12 +38,12 @@ def read_png(file: Path) -> StoredPicture:
     """Read a PNG file as it is stored. Raises BadInput, and nearly anything for what is damaged."""
     from PIL import PngImagePlugin
 
-    data = file.read_bytes()
+    data, damage_notes = _without_damaged_extras(file.read_bytes())
     deep = data[24] == 16  # the header chunk's bit depth
     image = load(file, PngImagePlugin.PngImageFile, io.BytesIO(data), 8 if deep else 4)
     if _END not in data[-4096:] and _END not in data:
         raise damaged(file, "PNG")
-    notes = animation_notes(image)
+    notes = (*damage_notes, *animation_notes(image))
     stored = _deep(file, data, image, notes) if deep else stored_picture(image, notes=notes)
     return _by_its_chunks(file, stored, data, image.info)
 
@@ -102,6 +103,27 @@ def _by_its_chunks(file: Path, stored: StoredPicture, data: bytes, info: Any) ->
     if not np.allclose(primaries, SRGB, atol=2e-3):
         note += " and the primaries in the file"
     return stored._replace(values=colours, notes=(*stored.notes, f"{note}."))
+
+
+def _without_damaged_extras(data: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """The file without chunks that pixels do not need and whose checksums are wrong; libpng leaves
+    them out, too, and Pillow would refuse the file."""
+    kept, at, names = [data[:8]], 8, []
+    while at + 12 <= len(data):
+        end = at + 12 + int.from_bytes(data[at : at + 4], "big")
+        if end > len(data) or data[at + 4 : at + 8] == b"IEND":
+            break
+        is_extra = bool(data[at + 4] & 0x20)
+        checksum = int.from_bytes(data[end - 4 : end], "big")
+        if is_extra and zlib.crc32(data[at + 4 : end - 4]) != checksum:
+            names.append(data[at + 4 : at + 8].decode("latin-1"))
+        else:
+            kept.append(data[at:end])
+        at = end
+    if not names:
+        return data, ()
+    note = f"Chunks with a wrong checksum were left out: {', '.join(names[:8])}."
+    return b"".join([*kept, data[at:]]), (note,)
 
 
 def _chunk(data: bytes, name: bytes) -> bytes | None:

@@ -139,8 +139,12 @@ def _left_out(page: tifffile.TiffPage) -> list[str]:
     extra = page.samplesperpixel - _COLOURS[int(page.photometric)]
     alphas = sum(kind in (_ASSOCIATED, _UNASSOCIATED) for kind in page.extrasamples[:1])
     if extra > alphas:
-        channels = "1 extra channel" if extra - alphas == 1 else f"{extra - alphas} extra channels"
-        notes.append(f"{channels} (not said to be transparency) left out.")
+        are = (
+            "1 extra channel was"
+            if extra - alphas == 1
+            else f"{extra - alphas} extra channels were"
+        )
+        notes.append(f"{are} left out, as none is said to be transparency.")
     return notes
 
 
