@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -247,7 +246,7 @@ def _xmp(text: str) -> bytes:
     return b"http://ns.adobe.com/xap/1.0/\0" + text.encode()
 
 
-def _mpf(kinds: Sequence[int]) -> bytes:
+def _mpf(kinds: list[int]) -> bytes:
     """An index of pictures (CIPA DC-007) of these types, the first being the picture itself."""
     entries = b"".join(
         struct.pack(">IIIHH", kind, 100, 0 if number == 0 else 5000, 0, 0)
