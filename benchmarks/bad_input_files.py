@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.captures.probe_files import by_pixel, hdr, luminance_chroma, rgbe
-
 SPECIAL = ("folder", "pipe", "socket", "device")
 """What a case's file may be instead of bytes."""
 
@@ -43,10 +41,7 @@ def valid_cases() -> list[Case]:
         "mesh.mtl": b"newmtl a\nKd .5 .25 1\nKs .1 .1 .1\nNs 30\nnewmtl b\nKd 1 0 0\nPr .4\n"
     }
     encoded = pictures(64, 66)
-    lights = {**_radiance_pictures(16, 8), "light.exr": _exr(16, 8, "RGB", np.float32)} | {
-        "older.hdr": hdr(pixels=b"".join(map(by_pixel, rgbe()))),
-        "chroma.exr": luminance_chroma(),
-    }
+    lights = {**_radiance_pictures(16, 8), "light.exr": _exr(16, 8, "RGB", np.float32)}
     profiles = {
         "commas.csv": b"v,n\n" + b"".join(b"%d,%d.5\n" % (v, v % 3) for v in range(12)),
         "semicolons.csv": b"# v [um]; n [um]\n0,5; 0\n1,5; -0,25\n2; -1e-1\n3; 0\n",
@@ -55,6 +50,8 @@ def valid_cases() -> list[Case]:
         *(Case(name, "photograph", name, {name: data}) for name, data in encoded.items()),
         *_people_have("photographs", "photograph"),
         *(Case(name, "environment", name, {name: data}) for name, data in lights.items()),
+        *_people_have("light_probes", "environment", ".hdr"),
+        *_people_have("light_probes", "environment", ".exr"),
         *(Case(name, "mesh", name, {name: data}) for name, data in meshes.items()),
         *(Case(name, "scene", name, {name: data, **library}) for name, data in meshes.items()),
         *_people_have("gltf", "mesh", ".glb"),

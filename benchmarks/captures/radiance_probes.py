@@ -123,7 +123,7 @@ _STORED = (
         ),
     ),
     Case(
-        "long.hdr",
+        "long.rgbe",
         "lines longer than the newer code",
         _read_photograph,
         "read",
@@ -132,7 +132,7 @@ _STORED = (
         saved(hdr(size="-Y 2 +X 40000", pixels=b"".join(map(by_pixel, _long_runs())))),
     ),
     Case(
-        "short.hdr",
+        "short.rgbe",
         "lines shorter than the newer code",
         _read_photograph,
         "read",
