@@ -48,17 +48,25 @@ vec3 amplitude(int number) {
 }
 
 #if TEXTURED
+// What a texture has at one of two mappings. place: two factors to its own coordinates, and which
+// mapping; limits: from where to where it is not clamped. A little sharper than the level that the
+// card takes by the longer side of a pixel.
+vec3 texelAt(sampler2D map, vec4 place, vec4 limits) {
+  vec2 mapping = place.z < 0.5 ? mappingsOut.xy : mappingsOut.zw;
+  return texture(map, clamp(mapping * place.xy, limits.xy, limits.zw), -0.5).rgb;
+}
+
 Look seenLook() {
   vec3 base = factors.rgb * paintOut, shares = vec3(1.0), normal = normalize(shadingOut);
 #if COLOUR_MAP
-  base *= texelAt(colourMap, mappingsOut, colourPlace, colourLimits);
+  base *= texelAt(colourMap, colourPlace, colourLimits);
 #endif
 #if SURFACE_MAP
-  shares = texelAt(surfaceMap, mappingsOut, surfacePlace, surfaceLimits);
+  shares = texelAt(surfaceMap, surfacePlace, surfaceLimits);
 #endif
   Look seen = lookOf(normal, base, factors.w * shares.b, finish.rgb * shares.r, finish.w * shares.g);
 #if NORMAL_MAP
-  vec3 bump = 2.0 * texelAt(normalMap, mappingsOut, normalPlace, normalLimits) - 1.0;
+  vec3 bump = 2.0 * texelAt(normalMap, normalPlace, normalLimits) - 1.0;
   seen.roughness = roughenedSlope(seen.roughness, length(bump), normalPlace.w);
   bump.xy *= normalPlace.w;
   vec2 mapping = normalPlace.z < 0.5 ? mappingsOut.xy : mappingsOut.zw;

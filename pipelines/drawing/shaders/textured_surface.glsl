@@ -10,13 +10,6 @@ struct Look {
   float roughness;  // Beckmann's slope
 };
 
-// What a texture has at one of two mappings. place: two factors to its own coordinates, and which
-// mapping; limits: from where to where it is not clamped.
-vec3 texelAt(sampler2D map, vec4 mappings, vec4 place, vec4 limits) {
-  vec2 mapping = place.z < 0.5 ? mappings.xy : mappings.zw;
-  return texture(map, clamp(mapping * place.xy, limits.xy, limits.zw)).rgb;
-}
-
 Look lookOf(vec3 normal, vec3 base, float metal, vec3 specular, float roughness) {
   float rest = clamp(1.0 - metal, 0.0, 1.0);
   vec3 reflected = specular * rest + base * metal;

@@ -88,7 +88,12 @@ def _material_rows(materials: Materials) -> NDArray[np.float32]:
     rows[0, :, :3], rows[0, :, 3] = materials.albedo, materials.specular
     rows[1, :, 0] = materials.roughness
     rows[1, :, 1:] = 1.0 if materials.tint is None else materials.tint
-    return rows
+    return _two_wide(rows)
+
+
+def _two_wide(texels: NDArray[Any]) -> NDArray[Any]:
+    """VTK lays a picture of one column on its side."""
+    return texels.repeat(2, axis=1) if texels.shape[1] == 1 else texels
 
 
 # ---- with textures -----------------------------------------------------------------------------
@@ -156,6 +161,6 @@ def _map(given: Texture, *, srgb: bool) -> tuple[Any, list[float], list[float]]:
                 halves = [texels, np.flip(texels, 1 - axis)]
                 texels = np.concatenate(halves[:: 1 if axis == 0 else -1], axis=1 - axis)
                 scale[axis] = 0.5
-    made = texture(texels, wrap=wrap, mipmap=True, srgb=srgb)
+    made = texture(_two_wide(texels), wrap=wrap, mipmap=True, srgb=srgb)
     made.SetMaximumAnisotropicFiltering(_ANISOTROPY)
     return made, [*scale, float(given.mapping), 0.0], [*low, *high]

@@ -61,17 +61,36 @@ _GLASS: dict[str, Any] = {
     "TILE": 0.35,
     "THROUGH": 0.7,
 }
+_LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0}
+_GLOSSY: dict[str, Any] = {
+    "LIGHTS": 24,
+    "EDGES": 12,
+    "GLOSS": True,
+    "LEAST_VIEW": 0.05,
+    "GLOSS_COLUMNS": 64,
+}
+_TEXTURED: dict[str, Any] = {
+    "TEXTURED": True,
+    "COLOUR_MAP": True,
+    "SURFACE_MAP": True,
+    "NORMAL_MAP": True,
+    "LEAST_SLOPE": 0.05,
+    "MOST_SPECULAR": 0.99,
+}
+_GRID: dict[str, Any] = {
+    "GRID_START": [0.05, 0.02],
+    "GRID_END": [1.0, 0.99],
+    "GRID_STEPS": [12.0, 5.0],
+}
 STAGES: list[tuple[str, dict[str, Any]]] = [
     ("painted", {}),
     *(("fur", {"CODE_STEPS": 25.0, "DECAY": 0.3, "COLUMNS": columns}) for columns in (True, False)),
     ("scratched_glass", _GLASS),
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
-    ("lit", {"LIGHTS": 5, "EDGES": 2, "MATT_HALF": 1024.0, "GLOSS": False}),
-    (
-        "lit",
-        {"LIGHTS": 24, "EDGES": 12, "MATT_HALF": 1024.0, "GLOSS": True}
-        | {"LEAST_VIEW": 0.05, "GLOSS_COLUMNS": 64},
-    ),
+    ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
+    ("lit", _LIT | _GLOSSY),
+    ("lit", _LIT | _TEXTURED | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
+    ("lit", _LIT | _TEXTURED | _GLOSSY | _GRID),
     ("street", _STREET),
     ("street", _STREET | _RGB),
     ("street", _STREET | {"DETAIL_TILES": 0}),
