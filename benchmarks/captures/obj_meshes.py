@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from PIL import Image
 
 from benchmarks.captures.case import FILES, Case, Ending
 from benchmarks.captures.mesh_truth import (
@@ -98,6 +99,17 @@ def _split(gap: float) -> str:
     return obj_vertices(moved) + obj_faces(np.arange(30).reshape(-1, 3))
 
 
+def _with_library(line: str) -> Callable[[Path], object]:
+    """A material with a line, and a picture beside it."""
+
+    def write(path: Path) -> None:
+        path.write_text(f"mtllib house.mtl\n{_V}usemtl wall\n{_F}")
+        path.with_name("house.mtl").write_text(f"newmtl wall\n{line}")
+        Image.new("RGB", (2, 2)).save(path.with_name("brick.png"))
+
+    return write
+
+
 _CASES_OF_FILES = (
     _case("egg_closed", "a plain mesh", None, is_right=_is_the_egg),
     _case(
@@ -150,6 +162,14 @@ _CASES_OF_FILES = (
 )
 
 _CASES_OF_TEXT = (
+    _case("with_library", "materials without textures", _with_library("Kd 1 0 0\n")),
+    _case(
+        "with_texture",
+        "textures where none are used",
+        _with_library("map_Kd brick.png\n"),
+        "told",
+        ["1 texture not used"],
+    ),
     _case("negative", "references backwards", _V + "vn 0 0 1\n" + obj_faces(SIDES - 8)),
     _case("cr", "line ends", (_V + _F).replace("\n", "\r")),
     _case("tabs_bom", "text encodings", "\ufeff" + (_V + _F).replace(" ", "\t")),

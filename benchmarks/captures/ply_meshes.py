@@ -262,6 +262,20 @@ CASES = (
                 head=_head("binary_little_endian", (*_XYZ, "float confidence", "float intensity")),
             )
         ),
+        "told",
+        ["Properties of its vertices not used: confidence, intensity"],
+    ),
+    _case(
+        "meshlab_corner_colours.ply",
+        "rows longer than their header",
+        text(
+            ply_head("ascii", _XYZ, (*_LISTS, "uchar red", "uchar green"), (7, 10))
+            + "end_header\n"
+            + rows_of(SOLID)
+            + rows_of(np.full(10, 3), SIDES, np.full(10, 9), np.ones((10, 9)))
+        ),
+        "told",
+        ["Numbers at the ends of its lines left out"],
     ),
     _case(
         "obj_info.ply",

@@ -28,6 +28,7 @@ _COLOURS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
     ("r", "g", "b", "a"),
 )
+_NORMALS = {"nx", "ny", "nz"}  # which the product computes
 _SPLATS = ({"f_dc_0", "opacity", "scale_0", "rot_0"}, {"packed_position", "packed_scale"})
 _FULL = {"u1": 255.0, "u2": 65535.0}
 
@@ -166,6 +167,17 @@ def _notes(rows: PlyRows) -> list[str]:
         if element.name not in ("vertex", "face", "tristrips") and element.rows
     ]
     notes = [f"Its {', '.join(others)} not read: only vertices and faces are."] if others else []
+    known = {"x", "y", "z"}.union(_NORMALS, *_UV_NAMES, *_COLOURS)
+    own = [
+        item.name[:60]
+        for element in rows.elements
+        if element.name == "vertex"
+        for item in element.properties
+        if item.name not in known
+    ]
+    if own:
+        more = f" and {len(own) - 6} more" if len(own) > 6 else ""
+        notes.append(f"Properties of its vertices not used: {', '.join(own[:6])}{more}.")
     words = [comment.split(None, 1) for comment in rows.comments]
     textures = [word[1] for word in words if word[0].lower() == "texturefile" and len(word) > 1]
     if textures:

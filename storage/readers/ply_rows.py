@@ -74,10 +74,11 @@ def read_rows(file: Path) -> PlyRows:
     columns = _read_elements(body, header)
     notes: tuple[str, ...] = ()
     if isinstance(body, _AsciiBody) and (columns is None or not body.is_at_end()):
-        by_lines = _read_elements(_AsciiBody(_numbers_of_lines(data, start, header)), header)
-        if by_lines is not None and columns is None:
+        lined = _AsciiBody(_numbers_of_lines(data, start, header))
+        by_lines = _read_elements(lined, header)
+        if by_lines is not None and not lined.is_start_of(body):
+            columns = by_lines
             notes = ("Numbers at the ends of its lines left out: its header has no such.",)
-        columns = by_lines if by_lines is not None else columns
     if columns is None:
         expected = "all the rows that the header announces: export it, or load it down, again"
         raise BadInput(file, "content", "truncated or damaged", expected)
@@ -140,6 +141,9 @@ class _AsciiBody:
 
     def is_at_end(self) -> bool:
         return self.at == len(self._numbers)
+
+    def is_start_of(self, other: _AsciiBody) -> bool:
+        return np.array_equal(self._numbers, other._numbers[: len(self._numbers)], equal_nan=True)
 
     def take(self, type_: np.dtype[Any], count: int) -> NDArray[np.float64]:
         if count < 0 or self.at + count > len(self._numbers):

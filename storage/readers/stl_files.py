@@ -54,8 +54,7 @@ def _binary(file: Path, data: bytes) -> tuple[np.ndarray, tuple[str, ...]]:
         found = f"truncated: {there} of {count} triangles"
         raise BadInput(file, "content", found, "all triangles: export it again")
     triangles = np.frombuffer(data, _TRIANGLE, count, _HEADER)
-    # Two conventions for colours have in common that bit 15 or the header marks them.
-    coloured = (triangles["attribute"] >> 15).any() or b"COLOR=" in data[:80]
+    coloured = triangles["attribute"].any() or b"COLOR=" in data[:80]  # by several conventions
     notes = ("Colours of its triangles are not used.",) if coloured else ()
     return triangles["corners"].reshape(-1, 3).astype(np.float64), notes
 
