@@ -68,6 +68,13 @@ _SPACES = (
         equals(converted("Rec. 2020"), 1e-5),
     ),
     probe("linear.exr", "colour spaces by name", exr(None, **{"oiio:ColorSpace": "Linear"})),
+    probe(
+        "encoded.exr",
+        "colour spaces by name",
+        exr(None, **{"oiio:ColorSpace": "sRGB"}),
+        "told",
+        ["'sRGB' by the header, were taken as linear"],
+    ),
     probe("candela.exr", "a white's luminance", exr(whiteLuminance=100.0)),
     probe("unset.exr", "primaries that are unset", exr(chromaticities=(0.0,) * 8)),
     probe(

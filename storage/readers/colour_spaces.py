@@ -32,12 +32,23 @@ _SPACES = {
     "Radiance's RGB": (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, 1 / 3, 1 / 3),
 }
 _OTHER_NAMES = {
-    "sRGB": ("linear", "scene linear", "linsrgb", "lin srgb scene", "linear srgb", "lin srgb"),
+    "sRGB": (
+        *("linear", "scene linear", "role scene linear", "lin srgb", "lin srgb scene", "linsrgb"),
+        *("linear srgb", "lin rec709", "lin rec709 scene", "linear rec 709", "linear rec709"),
+        *("linear rec 709 srgb", "utility linear srgb", "utility linear rec 709", "raw", "data"),
+        *("utility raw", "unknown", "none", ""),
+    ),
     "ACEScg": ("lin ap1", "lin ap1 scene", "ap1", "aces acescg"),
     "ACES2065-1": ("lin ap0", "lin ap0 scene", "ap0", "aces", "aces aces2065 1"),
     "CIE XYZ": ("lin ciexyzd65", "lin ciexyzd65 scene", "xyz", "cie xyz d65"),
-    "Rec. 2020": ("lin rec2020", "lin rec2020 scene", "linear rec 2020", "linear rec2020"),
-    "Display P3": ("lin p3d65", "lin p3d65 scene", "lin displayp3", "linear p3 d65"),
+    "Rec. 2020": (
+        *("lin rec2020", "lin rec2020 scene", "linear rec 2020", "linear rec2020"),
+        "utility linear rec 2020",
+    ),
+    "Display P3": (
+        *("lin p3d65", "lin p3d65 scene", "lin displayp3", "linear p3 d65"),
+        "utility linear p3 d65",
+    ),
     "Adobe RGB": ("lin adobergb", "lin adobergb scene", "linear adobergb", "linear adobe rgb"),
 }
 _BRADFORD = np.array(

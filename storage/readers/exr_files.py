@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers import exr_layers
-from storage.readers.bad_input import BadInput
+from storage.readers.bad_input import BadInput, shortened
 from storage.readers.colour_spaces import (
     CIE_XYZ,
     LINEAR_SRGB,
@@ -123,10 +123,10 @@ def exr_header(file: Path) -> ExrHeader:
     check_area(file, width, height, 4)
     _check_all(file, headers)
     stored = _inside(file, header["dataWindow"], header["displayWindow"])
-    space, weights = _colours(file, header, headers[0])
+    space, weights, space_notes = _colours(file, header, headers[0])
     if layer.kind == exr_layers.XYZ:
         space = CIE_XYZ
-    notes = list(layer.notes)
+    notes = [*layer.notes, *space_notes]
     if stored != (0, 0, width, height):
         notes.append(_window_note(stored, width, height))
     if layer.kind != exr_layers.GREY:
@@ -201,12 +201,12 @@ def _window_note(stored: tuple[int, int, int, int], width: int, height: int) -> 
 
 def _colours(
     file: Path, header: Mapping[str, Any], first: Mapping[str, Any]
-) -> tuple[ColourSpace, NDArray[np.float64]]:
+) -> tuple[ColourSpace, NDArray[np.float64], list[str]]:
     """Without attributes an EXR has the primaries of Rec. 709, which are those of sRGB."""
     given = header.get("chromaticities", first.get("chromaticities"))
     if given is not None:
         try:
-            return space_of(given), luminance_weights(given if any(given) else SRGB)
+            return space_of(given), luminance_weights(given if any(given) else SRGB), []
         except ValueError:
             text = ", ".join(f"{value:.4g}" for value in given)
             expected = "red, green, blue and white, x and y of each (without them it is sRGB)"
@@ -214,10 +214,15 @@ def _colours(
     names = [header.get(name, first.get(name)) for name in _SPACE_ATTRIBUTES]
     if header.get("acesImageContainerFlag") == 1:
         names.insert(0, "ACES2065-1")
-    for name in names:
-        if isinstance(name, str) and (space := named_space(name)):
-            return space, luminance_weights()
-    return LINEAR_SRGB, luminance_weights()
+    said = [name for name in names if isinstance(name, str)]
+    for name in said:
+        if (space := named_space(name)) and name.lower() != "srgb":  # which is that of codes
+            return space, luminance_weights(), []
+    notes = [
+        f"The colours, {shortened(name)!r} by the header, were taken as linear sRGB."
+        for name in said[:1]
+    ]
+    return LINEAR_SRGB, luminance_weights(), notes
 
 
 def _planes(file: Path, header: ExrHeader, names: Sequence[str]) -> list[NDArray[Any]]:
