@@ -72,7 +72,7 @@ def _read(source: Source, settings: MeshSettings) -> MendedMesh:
     """A mesh of the user's, upright and repaired, or a built-in one."""
     from pipelines.geometry import shapes
     from pipelines.geometry.mended_meshes import MendedMesh, mend_mesh
-    from pipelines.geometry.meshes import y_up_to_z_up
+    from pipelines.geometry.meshes import brought_near, y_up_to_z_up
     from storage.readers.gltf import SUFFIXES
     from storage.readers.meshes import read_mesh
 
@@ -80,8 +80,9 @@ def _read(source: Source, settings: MeshSettings) -> MendedMesh:
         vertices, triangles, uvs, notes = read_mesh(source.path)
         if settings.up == "y" or (settings.up == "auto" and source.path.suffix.lower() in SUFFIXES):
             vertices = y_up_to_z_up(vertices)
+        vertices, moved = brought_near(vertices)
         mended = mend_mesh(vertices, triangles, uvs)
-        return mended._replace(notes=(*notes, *mended.notes))
+        return mended._replace(notes=(*notes, *moved, *mended.notes))
     built_in = {
         SQUARE: lambda: shapes.square(32),
         "sphere": lambda: shapes.sphere(64),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry.mended_meshes import mend_mesh
+from pipelines.geometry.meshes import brought_near
 from pipelines.geometry.solids import make_closed_mesh
 from storage.readers.bad_input import BadInput
 from storage.readers.meshes import read_mesh
@@ -50,10 +51,11 @@ class Blown(NamedTuple):
 
 
 def read_for_fur(path: Path) -> Furred:
-    """A mesh as fur has it: read, repaired, mapped."""
+    """A mesh as fur has it: read, brought near, repaired, mapped."""
     vertices, triangles, uvs, notes = read_mesh(path)
+    vertices, moved = brought_near(vertices)
     mesh, mended = mend_mesh(vertices, triangles, uvs)
-    return Furred(mesh.vertices, mesh.triangles, mesh.uvs, mesh.normals, (*notes, *mended))
+    return Furred(mesh.vertices, mesh.triangles, mesh.uvs, mesh.normals, (*notes, *moved, *mended))
 
 
 def read_for_glass(path: Path) -> Blown:

@@ -289,6 +289,15 @@ _CASES_OF_TEXT = (
         read=read_for_glass,
     ),
     _case(
+        "georeferenced_for_fur",
+        "places and units",
+        obj_vertices(SOLID + _FAR) + _F,
+        "told",
+        [r"moved by \(-4500001, -5200001, -301.5\)"],
+        has_triangles(SOLID - [1, 1, 1.5], SIDES),
+        read_for_fur,
+    ),
+    _case(
         "nanometres",
         "places and units",
         obj_vertices(SOLID * 1e-9) + _F,

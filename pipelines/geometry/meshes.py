@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipelines.geometry.texture_coordinates import unwrap
 
+FAR = 10.0
+"""Radii of a mesh; as far away single precision has its vertices to a millionth of that."""
+
 _TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -81,6 +84,26 @@ def y_up_to_z_up(vertices: ArrayLike) -> NDArray[np.float64]:
     """Vertices (V, 3) of a mesh whose up is +y, turned about x so that it is +z."""
     x, y, z = np.asarray(vertices, dtype=np.float64).T
     return np.stack([x, -z, y], axis=-1)
+
+
+def brought_near(vertices: ArrayLike) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Vertices (V, 3) for single precision: those of a mesh more than ``FAR`` of its radii from
+    the origin (maps have it so) are moved such that the middle of their box is the origin. What was
+    done is one sentence, or none.
+
+    >>> near, notes = brought_near([[500000.0, 7.0, 0.0], [500002.0, 7.0, 1.0]])
+    >>> near.tolist(), notes
+    ([[-1.0, 0.0, -0.5], [1.0, 0.0, 0.5]], ('The mesh was moved by (-500001, -7, -0.5): it was \
+far from the origin for its size.',))
+    """
+    points = np.asarray(vertices, np.float64)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    radius = np.linalg.norm(points - middle, axis=1).max()
+    if np.linalg.norm(middle) <= FAR * radius:
+        return points, ()
+    way = ", ".join(f"{-coordinate:.10g}" for coordinate in middle)
+    note = f"The mesh was moved by ({way}): it was far from the origin for its size."
+    return points - middle, (note,)
 
 
 # --- Normals ------------------------------------------------------------------------------------
