@@ -9,16 +9,23 @@ import pytest
 
 from benchmarks.captures.case import Case, outcome, write_file
 from benchmarks.captures.cases import CASES
+from benchmarks.captures.second_readers import silent
 from benchmarks.captures.wrong_readings import halved, upside_down
 
 ALL = [case for cases in CASES.values() for case in cases]
+GROUPS = [group for group, cases in CASES.items() for _ in cases]
 
 
-@pytest.mark.parametrize("case", ALL, ids=lambda case: case.file)
-def test_a_file_ends_as_it_is_right(case: Case, tmp_path: Path) -> None:
-    found = outcome(case, write_file(case, tmp_path))
+@pytest.mark.parametrize(
+    ("group", "case"), zip(GROUPS, ALL, strict=True), ids=[case.file for case in ALL]
+)
+def test_a_file_ends_as_it_is_right(group: str, case: Case, tmp_path: Path) -> None:
+    path = write_file(case, tmp_path)
+    found = outcome(case, path)
     assert found.is_as_expected, f"{found.ending}: {found.what}"
     assert found.has_way_out, found.what
+    if found.found is not None:
+        assert silent(path, group, found.found.notes, found.found) == []
 
 
 def test_every_file_that_was_met_is_a_case() -> None:
