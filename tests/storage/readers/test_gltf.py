@@ -16,7 +16,12 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersGeometry import vtkCompositeDataGeometryFilter
+from vtkmodules.vtkIOGeometry import vtkGLTFReader
 
+from benchmarks.captures.case import Case, write_file
+from benchmarks.captures.gltf_scenes import SCENES
 from benchmarks.captures.gltf_writing import (
     PYRAMID,
     SIDES,
@@ -207,6 +212,33 @@ def test_shapes_that_trimesh_writes(tmp_path: Path) -> None:
     )
     volume = np.linalg.det(corners_of(found)).sum() / 6
     assert volume == pytest.approx(together.volume, rel=1e-4)
+
+
+VTK_LACKS = ("gltf_morph_sparse.glb", "gltf_skin_8.glb")  # targets without a view, JOINTS_1
+POSED = [
+    case
+    for case in SCENES
+    if case.kind in ("skins", "morph targets") and case.is_right and case.file not in VTK_LACKS
+]
+
+
+@pytest.mark.parametrize("case", POSED, ids=lambda case: case.file)
+def test_skins_and_morph_targets_stand_as_vtk_has_them(tmp_path: Path, case: Case) -> None:
+    """VTK turns no triangles of mirroring joints over: areas and places, not orientations."""
+    path = write_file(case, tmp_path)
+    reader = vtkGLTFReader()
+    reader.SetFileName(str(path))
+    reader.SetApplyDeformationsToGeometry(True)
+    reader.Update()
+    surface = vtkCompositeDataGeometryFilter()
+    surface.SetInputConnection(reader.GetOutputPort())
+    surface.Update()
+    points = vtk_to_numpy(surface.GetOutput().GetPoints().GetData()).astype(float)
+    triangles = vtk_to_numpy(surface.GetOutput().GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    second = points[triangles]
+    found = corners_of(read_gltf(path))
+    assert found.shape == second.shape
+    assert are_triangles(np.sort(found, axis=1), np.sort(second, axis=1))
 
 
 # --- Files that are wrong -----------------------------------------------------------------------
