@@ -153,7 +153,8 @@ def in_ply(path: Path) -> Found:
     own = sorted(name for name in of_vertices if not _OF_VERTICES.fullmatch(name))
     if own:
         found["attribute"] = ", ".join(own)
-    if names & {"red", "diffuse_red", "r"}:
+    colours = ({"red", "green", "blue"}, {"diffuse_red", "diffuse_green", "diffuse_blue"})
+    if any(three <= names for three in (*colours, {"r", "g", "b"})):
         found["colours"] = "of vertices or faces"
     textures = [" ".join(line[2:]) for line in lines if line[:2] == ["comment", "TextureFile"]]
     if textures:

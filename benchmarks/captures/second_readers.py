@@ -76,7 +76,8 @@ def silent(path: Path, group: str, notes: Sequence[str], reading: object = None)
     ``reading``: what was read of it; colours that it has are not dropped.
     """
     used = USED.get(group, frozenset())
-    if getattr(reading, "corner_colours", None) is not None:
+    mesh = getattr(reading, "mesh", reading)
+    if getattr(mesh, "corner_colours", None) is not None:
         used |= {"colours"}
     return [
         f"{thing}: {what}"

@@ -64,8 +64,9 @@ def _obj(path: Path) -> None:
 def _ply(path: Path) -> None:
     path.write_text(
         "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 1\nproperty float x\n"
-        "property float y\nproperty float z\nproperty uchar red\nproperty float quality\n"
-        "element edge 1\nproperty int vertex1\nend_header\n0 0 0 9 1\n0\n"
+        "property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+        "property uchar blue\nproperty float quality\nelement edge 1\nproperty int vertex1\n"
+        "end_header\n0 0 0 9 9 9 1\n0\n"
     )
 
 
