@@ -20,6 +20,7 @@ from storage.readers.materials.material import (
 from storage.readers.materials.pictures import Pictures, side_for
 
 _MAPPINGS = 2
+_FARTHEST = 1e6  # textures: single precision knows no place of a texel farther out
 _DIGITS = 12  # a slope of 0.3 stays 0.3, though its root was taken
 _CODES = np.arange(256) / 255
 _LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
@@ -208,5 +209,5 @@ def placed_uvs(
             u, v = np.moveaxis(np.nan_to_num(uvs[placing.set][triangles]), 2, 0)
             a, b, c, d, e, f = placing.matrix
             placed = np.stack([a * u + b * v + c, d * u + e * v + f], axis=2)
-            found[triangles, :, mapping] = placed
+            found[triangles, :, mapping] = np.clip(np.nan_to_num(placed), -_FARTHEST, _FARTHEST)
     return found

@@ -11,6 +11,8 @@ from storage.readers.opening import number, whole_file
 from storage.readers.references import file_beside
 
 _LARGEST_TEXTURE = 256 << 20  # bytes
+_LARGEST_NUMBER = 1e6
+_Options = dict[str, list[float] | list[str]]
 _WORDS = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-type": 1}
 """Options with a word after them."""
 _NUMBERS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2, "-bm": 1, "-boost": 1, "-texres": 1}
@@ -40,12 +42,8 @@ def read_map(library: Path, rest: str) -> tuple[Map | None, list[str]]:
         notes.append(f"the turbulence of its texture {shortened(there.name)} is not used")
     if options.get("-imfchan", ["l"]) != ["l"]:
         notes.append(f"the choice of a channel of {shortened(there.name)} is not used")
-    (su, sv, *_), (ou, ov, *_) = (
-        [*map(float, options.get(key, [])), missing, missing, missing]
-        for key, missing in (("-s", 1.0), ("-o", 0.0))
-    )
+    (su, sv), (ou, ov) = _pair(options, "-s", 1.0, 1.0), _pair(options, "-o", 0.0, 0.0)
     wrap: Wrap = "clamp" if options.get("-clamp") == ["on"] else "repeat"
-    gain = [*options.get("-mm", [0.0, 1.0]), 1.0]
     file = there
     return (
         Map(
@@ -54,16 +52,23 @@ def read_map(library: Path, rest: str) -> tuple[Map | None, list[str]]:
             lambda: whole_file(file, "a texture", _LARGEST_TEXTURE),
             Placing(0, (su, 0.0, ou, 0.0, sv, ov)),
             (wrap, wrap),
-            (float(gain[0]), float(gain[1])),
-            float([*options.get("-bm", []), 1.0][0]),
+            _pair(options, "-mm", 0.0, 1.0),
+            _pair(options, "-bm", 1.0, 1.0)[0],
         ),
         notes,
     )
 
 
-def _split(rest: str) -> tuple[dict[str, list[float] | list[str]], str]:
+def _pair(options: _Options, key: str, first: float, second: float) -> tuple[float, float]:
+    """The first two numbers of an option, those that are missing by default."""
+    given = [float(value) for value in options.get(key, [])]
+    found = [*given[:2], *(first, second)[len(given) :]]
+    return found[0], found[1]
+
+
+def _split(rest: str) -> tuple[_Options, str]:
     """The options of a line and what is left of it, the name."""
-    options: dict[str, list[float] | list[str]] = {}
+    options: _Options = {}
     rest = rest.strip()
     while rest:
         word, _, after = rest.partition(" ")
@@ -76,7 +81,10 @@ def _split(rest: str) -> tuple[dict[str, list[float] | list[str]], str]:
             while len(values) < _NUMBERS[option]:
                 word, _, after = rest.partition(" ")
                 try:
-                    values.append(number(word))
+                    found = number(word)
+                    if not abs(found) <= _LARGEST_NUMBER:
+                        break
+                    values.append(found)
                 except ValueError:
                     break
                 rest = after.strip()

@@ -122,11 +122,9 @@ def test_the_shader_shows_what_rays_find(
 
 @pytest.mark.parametrize(
     "wrap",
-    [("repeat", "repeat"), ("mirror", "mirror"), ("clamp", "clamp"), ("mirror", "clamp")],
+    [("repeat", "clamp"), ("mirror", "mirror"), ("clamp", "mirror"), ("mirror", "repeat")],
 )
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_shader_wraps_as_rays_do(wrap: tuple[Wrap, Wrap], turned: bool) -> None:
-    wrap = wrap[::-1] if turned else wrap
+def test_the_shader_wraps_as_rays_do(wrap: tuple[Wrap, Wrap]) -> None:
     scene = square(material(colour=COLOUR._replace(wrap=wrap)), times=3.0, shift=-1.2)
     stage, rays, shown = pictures(scene)
     assert psnr(stage, rays, shown) > 23.5
