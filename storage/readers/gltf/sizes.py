@@ -10,7 +10,7 @@ from storage.readers.gltf.primitives import FAN, STRIP, is_surface, joint_sets, 
 from storage.readers.gltf.scene_tree import Group, instance_counts
 from storage.readers.opening import check_memory
 
-_VERTEX_BYTES, _CORNER_BYTES = 60, 50  # of what is placed, with half as much again
+_VERTEX_BYTES, _CORNER_BYTES = 80, 110  # of what is placed, measured up to a scene's triangles
 _SET_BYTES = 40  # of each corner's texture coordinates, or colour
 _READ_BYTES = 64  # of each element of an accessor of up to four numbers
 _MATRIX_BYTES = 400
@@ -50,7 +50,7 @@ def check_sizes(document: dict[str, Any], accessors: Accessors, groups: list[Gro
                 vertices, its_corners = _size(primitive, accessors)
                 read = sum(map(accessors.count, _read(primitive, group)))
                 needed += _PRIMITIVE_BYTES + _READ_BYTES * read
-                needed += (copies + 1) * (_VERTEX_BYTES * vertices + _CORNER_BYTES * its_corners)
+                needed += copies * (_VERTEX_BYTES * vertices + _CORNER_BYTES * its_corners)
                 corners += copies * its_corners
                 sets.update(uv_sets(primitive))
                 sets.update({-1} if "COLOR_0" in primitive["attributes"] else ())
