@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -27,6 +28,8 @@ from storage.readers.usable_polygons import usable_polygons
 
 __all__ = ["Material", "SceneFile", "default_material", "read_scene"]
 
+_NOT_USED = re.compile(r"\d+ textures? not used")
+"""What the reader of PLY says of the texture that is used here."""
 _LARGEST_TEXTURE = 256 << 20  # bytes
 
 
@@ -168,7 +171,7 @@ def _of_one_part(file: Path, mesh: PolygonMesh) -> _Described:
     textures = companions(file)
     if textures and mesh.corner_uvs is not None:
         first = textures[0]
-        mesh = mesh._replace(notes=tuple(note for note in mesh.notes if "texture" not in note))
+        mesh = mesh._replace(notes=tuple(note for note in mesh.notes if not _NOT_USED.match(note)))
         description = description._replace(
             colour=Map(first, first.name, lambda: whole_file(first, "a picture", _LARGEST_TEXTURE))
         )
