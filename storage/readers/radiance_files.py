@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.colour_spaces import CIE_XYZ, LINEAR_SRGB, ColourSpace, named_space, space_of
 from storage.readers.opening import number
+from storage.readers.radiance_runs import decoded_lines
 
 SIGNATURE = b"#?"
 
@@ -182,13 +183,11 @@ def _primaries(file: Path, value: bytes) -> ColourSpace:
 
 
 def _rgbe(file: Path, data: bytes, at: int, lines: int, length: int) -> NDArray[np.uint8]:
-    from storage.readers.radiance_runs import decoded_lines
-
-    stored = np.frombuffer(data, np.uint8, offset=at)
     by_channel = bytes([2, 2, length >> 8 & 255, length & 255])
-    if len(stored) == 4 * lines * length and data[at : at + 4] != by_channel:
-        return stored.reshape(lines, length, 4)  # whatever pixels look like runs
-    pixels = decoded_lines(stored, lines, length)
+    if len(data) - at == 4 * lines * length and not data.startswith(by_channel, at):
+        # Flat, whatever pixels look like runs.
+        return np.frombuffer(data, np.uint8, offset=at).reshape(lines, length, 4)
+    pixels = decoded_lines(data, at, lines, length)
     if pixels is None:
         raise _damaged(file)
     return pixels

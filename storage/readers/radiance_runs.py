@@ -1,100 +1,83 @@
-"""The run-length codes of Radiance pictures, compiled: a scanline may be in any of three.
+"""The run-length codes of Radiance pictures: a scanline may be in any of three.
 
 After Ward's "Radiance File Formats" and ``color.c``. The code since 1991 goes channel by channel
 and begins 2, 2, the length in two bytes; the older one repeats a whole pixel, (1, 1, 1, n), each
-further such pixel counting 256 times as much; a flat line is one without such pixels.
+further such pixel counting 256 times as much; a flat line is one without such pixels. OpenCV knows
+the first code alone and takes the others for it where it can.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 _SHORTEST, _LONGEST = 8, 0x7FFF  # lines that the code by channel is for
+_MOST_COUNTS = 4  # pixels of a run's length
 
 
-def decoded_lines(stored: NDArray[np.uint8], lines: int, length: int) -> NDArray[np.uint8] | None:
-    """RGBE (lines, length, 4) of the bytes behind a header, None where they are too few or wrong.
+def decoded_lines(stored: bytes, at: int, lines: int, length: int) -> NDArray[np.uint8] | None:
+    """RGBE (lines, length, 4) of the bytes from ``at`` on, None where they are too few or wrong.
 
     Bytes behind the last line are passed over, as all readers do.
     """
-    pixels = np.empty((lines, length, 4), np.uint8)
-    return pixels if _decode(stored, pixels) else None
-
-
-@njit(cache=True, nogil=True)
-def _decode(stored: Any, pixels: Any) -> bool:
-    lines, length, _ = pixels.shape
-    at = 0
-    for line in range(lines):
-        if _by_channel(stored, at, length):
-            at = _decode_channels(stored, at + 4, pixels[line])
+    start = bytes([2, 2, length >> 8 & 255, length & 255])
+    by_channel = _SHORTEST <= length <= _LONGEST
+    planes = np.empty((lines, 4, length), np.uint8)
+    before = b""
+    for line in planes:
+        if by_channel and stored.startswith(start, at):
+            found = _channels(stored, at + 4, length)
         else:
-            at = _decode_pixels(stored, at, pixels, line)
-        if at < 0:
-            return False
-    return True
+            found = _pixels(stored, at, length, before)
+        if found is None:
+            return None
+        coded, at = found
+        line[:] = np.frombuffer(coded, np.uint8).reshape(4, length)
+        before = coded[length - 1 :: length]
+    return planes.transpose(0, 2, 1)
 
 
-@njit(cache=True, nogil=True)
-def _by_channel(stored: Any, at: int, length: int) -> bool:
-    return bool(
-        _SHORTEST <= length <= _LONGEST
-        and at + 4 <= len(stored)
-        and stored[at] == 2
-        and stored[at + 1] == 2
-        and stored[at + 2] == length >> 8
-        and stored[at + 3] == length & 255
-    )
+def _channels(stored: bytes, at: int, length: int) -> tuple[bytes, int] | None:
+    """The four channels one after the other, and where the next line begins."""
+    parts = []
+    for _ in range(4):
+        left = length
+        while left > 0:
+            count = stored[at] if at < len(stored) else 0
+            if count > 128:
+                count -= 128
+                part = stored[at + 1 : at + 2] * count
+                at += 2
+            else:
+                part = stored[at + 1 : at + 1 + count]
+                at += 1 + count
+            if not part or len(part) < count:
+                return None
+            parts.append(part)
+            left -= count
+        if left < 0:
+            return None
+    return b"".join(parts), at
 
 
-@njit(cache=True, nogil=True)
-def _decode_channels(stored: Any, at: int, line: Any) -> int:
-    """Where the next line begins, -1 where there is none."""
-    for channel in range(4):
-        column = 0
-        while column < len(line):
-            if at + 2 > len(stored):
-                return -1
-            count = int(stored[at])
-            at += 1
-            run = count > 128
-            count -= 128 * run
-            if column + count > len(line) or at + (1 if run else count) > len(stored):
-                return -1
-            for _ in range(count):
-                line[column, channel] = stored[at]
-                column += 1
-                at += not run
-            at += run
-    return at
-
-
-@njit(cache=True, nogil=True)
-def _decode_pixels(stored: Any, at: int, pixels: Any, line: int) -> int:
-    """Where the next line begins, -1 where there is none."""
-    length = pixels.shape[1]
-    column = shift = 0
-    while column < length:
-        if at + 4 > len(stored):
-            return -1
-        if stored[at] == 1 and stored[at + 1] == 1 and stored[at + 2] == 1:
-            if (line == 0 and column == 0) or shift > 24:
-                return -1
-            count = int(stored[at + 3]) << shift
-            if count > length - column:
-                return -1
-            before = pixels[line, column - 1] if column else pixels[line - 1, length - 1]
-            for _ in range(count):
-                pixels[line, column] = before
-                column += 1
-            shift += 8
-        else:
-            pixels[line, column] = stored[at : at + 4]
-            column += 1
-            shift = 0
-        at += 4
-    return at
+def _pixels(stored: bytes, at: int, length: int, before: bytes) -> tuple[bytes, int] | None:
+    """As `_channels`; ``before`` is the last pixel of the line before."""
+    many = max(min(length * (1 + _MOST_COUNTS), (len(stored) - at) // 4), 0)  # of any line
+    pixels = np.frombuffer(stored[at : at + 4 * many], np.uint8).reshape(many, 4)
+    repeats = (pixels[:, :3] == 1).all(axis=1)
+    if many >= length and not repeats[:length].any():
+        return pixels[:length].T.tobytes(), at + 4 * length
+    row = np.arange(many)
+    owner = np.maximum.accumulate(np.where(repeats, -1, row))
+    digit = (row - owner - 1).clip(max=_MOST_COUNTS)  # of a count, in base 256
+    counts = np.where(repeats, pixels[:, 3].astype(np.int64) << (8 * digit), 1)
+    ends = np.cumsum(counts)
+    last = int(np.searchsorted(ends, length))
+    if last == many or ends[last] != length or (digit[: last + 1] >= _MOST_COUNTS).any():
+        return None
+    shown = pixels[owner[: last + 1]]
+    if owner[0] < 0:
+        if not before:
+            return None
+        shown[owner[: last + 1] < 0] = np.frombuffer(before, np.uint8)
+    return np.repeat(shown, counts[: last + 1], axis=0).T.tobytes(), at + 4 * (last + 1)
