@@ -155,6 +155,11 @@ def _buffer_without_end(path: Path) -> None:
     (path.parent / "a.bin").write_bytes(made.binary[:-20])
 
 
+def _buffer_not_pulled(path: Path) -> None:
+    _beside("a.bin", "")(path)
+    (path.parent / "a.bin").write_bytes(_POINTER)
+
+
 def _two_buffers(path: Path) -> None:
     """A GLB whose corners are in its own chunk, and whose triangles are in a file beside."""
     made = one_mesh()
@@ -175,6 +180,9 @@ def _four_zeros(text: bytes, binary: bytes) -> bytes:
 def _cut(text: bytes, binary: bytes) -> bytes:
     return glb(text, binary)[:-30]
 
+
+_POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64 + b"\nsize 9\n"
+_PULL = "a pointer of Git LFS", "the file itself: run git lfs pull"
 
 CONTAINERS: tuple[Case, ...] = (
     _read("gltf_plain.glb", "GLB", _glb_with(glb)),
@@ -226,6 +234,8 @@ CONTAINERS: tuple[Case, ...] = (
         "gltf_broken_base64.gltf", "data URIs", _with_uri(_standard, _spoilt),
         "no base64", "export it anew",
     ),
-    _refused("gltf_of_text.gltf", "no glTF", _bytes(b"version https://git-lfs"), "JSON", "anew"),
+    _refused("gltf_of_text.gltf", "no glTF", _bytes(b"<html>404 Not Found"), "JSON", "anew"),
+    _refused("gltf_lfs.glb", "pointers of Git LFS", _bytes(_POINTER), *_PULL),
+    _refused("gltf_lfs_bin.gltf", "pointers of Git LFS", _buffer_not_pulled, *_PULL),
 )  # fmt: skip
 """What follows are kinds of numbers and of scenes: `gltf_geometry`, `gltf_scenes`."""

@@ -31,6 +31,7 @@ LARGEST_MEMORY = 1 << 30
 _INFINITE = re.compile(r"[-+]?1\.#INF0*")
 _NO_NUMBER = re.compile(r"[-+]?(1\.#(IND|QNAN|SNAN)0*|s?nan\(\w*\))", re.IGNORECASE)
 
+_LFS_POINTER = b"version https://git-lfs"
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISFIFO, "a named pipe"),
@@ -71,13 +72,17 @@ def first_bytes(
     largest: int | None = LARGEST_FILE,
     field: str = "file",
 ) -> bytes:
-    """How a file begins; raises BadInput as :func:`check_file`."""
+    """How a file begins; raises BadInput as :func:`check_file`, and for what Git leaves in the
+    place of a large file that was not loaded."""
     check_file(path, expected, largest, field)
     try:
         with open(path, "rb") as stream:
-            return stream.read(count)
+            start = stream.read(count)
     except OSError as error:
         raise unreadable(path, error, expected) from error
+    if start.startswith(_LFS_POINTER):
+        raise BadInput(path, field, "a pointer of Git LFS", "the file itself: run git lfs pull")
+    return start
 
 
 def whole_file(path: str | PathLike[str], expected: str, largest: int = LARGEST_FILE) -> bytes:
