@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
 from storage.readers.opening import check_file, number, whole_file
@@ -33,9 +34,16 @@ def read_stl(file: Path) -> PolygonMesh:
     start = whole_file(file, "an STL mesh")
     text = _TEXT.match(start) and not _is_binary(file, start)
     corners, notes = _text(file, start) if text else _binary(file, start)
-    positions, corner = np.unique(corners + 0.0, axis=0, return_inverse=True)  # no -0.0
+    corners = corners + 0.0  # no -0.0
+    # Sorted by hand: np.unique along an axis takes ten times as long.
+    order = np.lexsort(corners.T)
+    ordered = corners[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    corner = np.empty(len(order), np.int64)
+    corner[order] = np.cumsum(new) - 1
     sizes = np.full(len(corners) // 3, 3, np.int64)
-    return PolygonMesh(positions, sizes, corner.reshape(-1).astype(np.int64), None, notes=notes)
+    return PolygonMesh(ordered[new], sizes, corner, None, notes=notes)
 
 
 def _is_binary(file: Path, start: bytes) -> bool:
@@ -45,7 +53,7 @@ def _is_binary(file: Path, start: bytes) -> bool:
     return check_file(file, "an STL mesh") == _HEADER + count * _TRIANGLE.itemsize
 
 
-def _binary(file: Path, data: bytes) -> tuple[np.ndarray, tuple[str, ...]]:
+def _binary(file: Path, data: bytes) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     if len(data) < _HEADER:
         raise BadInput(file, "content", "truncated in its header", "a complete STL file")
     count = int.from_bytes(data[80:84], "little")
@@ -59,7 +67,7 @@ def _binary(file: Path, data: bytes) -> tuple[np.ndarray, tuple[str, ...]]:
     return triangles["corners"].reshape(-1, 3).astype(np.float64), notes
 
 
-def _text(file: Path, data: bytes) -> tuple[np.ndarray, tuple[str, ...]]:
+def _text(file: Path, data: bytes) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     words = (word for match in _CORNER.finditer(data) for word in match.groups())
     try:
         corners = np.fromiter(map(number, words), np.float64).reshape(-1, 3)
