@@ -19,6 +19,7 @@ _Kind = Literal["row", "empty", "text"]
 
 _COMMENT = re.compile(r"\s*(#|%|//|!|REM\b)\s*")
 _BEGINS_AS_NUMBER = re.compile(r"[-+\u2212]?\.?(\d|inf)")
+_OF_NUMBERS = frozenset("0123456789-+.,;eE \t")
 _DATE = re.compile(r"\d+[./:-]\d+[./:-]\d+")
 _SAMPLE = 1500  # lines that tell the separator
 _SURE = 3  # rows one after the other are a table, not numbers among an instrument's settings
@@ -61,20 +62,25 @@ def table_of(file: Path, lines: Sequence[Line]) -> Table:
     plain = [line for line in lines if not _COMMENT.match(line[1])]
     if len(plain) > MOST_POINTS + _PREAMBLE_LINES:  # at once; it takes a second to look at them
         raise too_many(file, len(plain))
+    if len(plain) > _SURE and plain[0][1].strip() == str(len(plain) - 1):
+        plain = plain[1:]  # it says how many points follow
     _check_cells(file, plain)
     separator = _separator(plain)
     split = [(number, split_cells(text, separator)) for number, text in plain]
     kinds = [_kind(cells) for _, cells in split]
     first = _first_row(kinds)
     if first is None:
-        raise BadInput(file, "number of points", "0", "at least 3 that differ, a line each")
+        raise BadInput(
+            file, "number of points", "0", "at least 3 that differ, a line of numbers each"
+        )
     last = next((at for at in range(first, len(kinds)) if kinds[at] == "text"), len(kinds))
     rows = split[first:last]
     if len(rows) > MOST_POINTS:
         raise too_many(file, len(rows))
     count = Counter(len(cells) for _, cells in rows[:100]).most_common(1)[0][0]
     for at in {first - 1, last} & set(range(len(kinds))):
-        if _is_broken(split[at][1], count):
+        only_numbers = at == last and not set(plain[at][1]) - _OF_NUMBERS
+        if only_numbers or _is_broken(split[at][1], count):
             found, expected = f"'{plain[at][1].strip()}'", "numbers, as on the lines beside it"
             raise BadInput(file, f"line {split[at][0]}", found, expected)
     before = [line for line in lines if line[0] < rows[0][0] and len(line[1]) <= _LONGEST_SAID]

@@ -40,26 +40,30 @@ _TRAILING = re.compile(r"(.*?[^\W_])(?:\s+in\s+|[\s_/,:-]+)([^\W\d_]+)")
 _AXES: dict[str, Role] = {"v": "v", "x": "v", "s": "v", "n": "n", "z": "n", "y": "y"}
 # In this order: "x profile" is across, "height position" is height, "profile length" is across.
 _WORDS: tuple[tuple[Role, frozenset[str]], ...] = (
-    ("other", set_of("time zeit temps intensity intensität index counter error flag")),
+    (
+        "other",
+        set_of("all both lengths values time zeit temps intensity intensität index counter error"),
+    ),
     (
         "v",
         set_of(
             "distance distances dist lateral horizontal length abscissa path travel weg strecke"
-            " abstand länge distanz distanza abscisse longueur 距離 水平距離 位置 横 長さ"
-            " profillänge traverse across"
+            " abstand länge distanz distanza abscisse longueur 距離 距离 位置 横 長さ"
+            " distancia traverse across"
         ),
     ),
     (
         "n",
         set_of(
             "height heights elevation altitude vertical amplitude topography depth höhe hoehe"
-            " tiefe hauteur profondeur altezza altura 高さ 深さ 高度 ordinate deflection"
+            " tiefe hauteur profondeur altezza altura 高さ 深さ 高度 深度 ordinate"
+            " ordonnée quota deflection"
         ),
     ),
-    ("v", set_of("position positions pos scan 座標 coordinate")),
+    ("v", set_of("position positions posición posizione pos scan 座標 coordinate")),
     ("n", set_of("profile profil raw level leveled levelled normalized data value")),
 )
-DEPTHS = set_of("depth tiefe profondeur 深さ")
+DEPTHS = set_of("depth tiefe profondeur 深さ 深度")
 """Names of heights that may count downwards."""
 
 
@@ -101,6 +105,10 @@ def role_of(name: str) -> Role:
             return _AXES[word]
     for role, known in _WORDS:
         if known.intersection(words):
+            return role
+    compound = "".join(words)  # Profilhöhe, 測定距離
+    for role, known in _WORDS:
+        if any(word in compound for word in known if len(word) > 3 or not word.isascii()):
             return role
     return "other"
 

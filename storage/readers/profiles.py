@@ -94,7 +94,7 @@ def _checked(
     points = points[is_new]
     if len(points) < FEWEST_POINTS:
         found = f"{len(points)}{f', {missing} more without a height' if missing else ''}"
-        expected = f"at least {FEWEST_POINTS} that differ, a line each"
+        expected = f"at least {FEWEST_POINTS} that differ, a line of numbers each"
         raise BadInput(file, "number of points", found, expected)
     for column, axis, expected in (
         (1, "height", "a profile with relief"),

@@ -183,6 +183,9 @@ READ: list[str | bytes] = [
     "0.07874015748031496;0\n",
     '"X Profile","Z Profile"\n"(mm)","(microns)"\n"0","0"\n"0.001","-1.5"\n"0.002","0"\n',
     "X,Z\n0,0\n1,\u22121.5\n2,0\n",
+    "3\n0 0\n1 -1.5\n2 0\n",
+    "sep=;\nMessstrecke [mm];Profilhöhe [nm]\n0;0\n0,001;-1500\n0,002;0\n",
+    "測定距離[μm],高さデータ[μm]\n0,0\n1,-1.5\n2,0\n",
     "X,Z\n0,0.0D+00\n1,-1.5D+00\n2,0.0D+00\n",
     "X Y Z\n5 0 0\n5 1 -1.5\n5 2 0\n".replace("X Y Z", "X[um] Y[um] Z[um]"),
 ]
@@ -293,6 +296,7 @@ REFUSED: list[tuple[str | bytes, str]] = [
     (("1;" * 300 + "\n") * 9, "number of cells is 2709 in 9 lines; expected at most 200 in a line"),
     ("# of a knife\n0,0\r\n1,one\r\n2,0\r\n", "line 3 is '1,one'; expected numbers, as on the"),
     ("0,0\n1,1\n2,0\n3,one\n", "line 4 is '3,one'; expected numbers"),
+    ("0,0\n1,1\n2,0\n3;0\n", "line 4 is '3;0'; expected numbers"),
     ("0,0\n1,\n2,0\n", f"{FEW} 2, 1 more without a height; expected at least 3"),
     ("0,0\n1_0,1\n2,0\n", "line 2 is '1_0,1'; expected numbers"),
     ("0,0\n0x1,1\n2,0\n", "line 2 is '0x1,1'"),
