@@ -10,10 +10,11 @@ from storage.readers.bad_input import BadInput
 from storage.readers.gltf.document import DRACO, INSTANCING, MESHOPT, VISIBILITY
 
 _READ = {*MESHOPT, DRACO, INSTANCING, VISIBILITY, "KHR_mesh_quantization"}
-_SAID = {"KHR_lights_punctual", "KHR_materials_variants", "MSFT_lod", "CESIUM_RTC"}
+LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based")
+_SAID = {*LIGHTS, "KHR_materials_variants", "MSFT_lod", "CESIUM_RTC"}
 """What `notes` has sentences for."""
-_LOOKS = re.compile(r"[A-Z]+[0-9]*_(materials?|textures?|lights?)_.*|MSFT_texture_dds|EXT_bloom")
-"""Of materials, textures and lights: whoever shows them judges."""
+_LOOKS = re.compile(r"[A-Z]+[0-9]*_(materials?|textures?)_.*")
+"""Of materials and textures: whoever shows them judges."""
 _WITHOUT_SHAPE = {
     "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_interactivity",
     "KHR_node_hoverability", "KHR_node_selectability", "KHR_audio_emitter", "KHR_audio_graph",

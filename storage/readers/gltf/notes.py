@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from storage.readers.bad_input import shortened
-from storage.readers.gltf.extensions import unread
+from storage.readers.gltf.extensions import LIGHTS, unread
 from storage.readers.gltf.primitives import TRIANGLES, is_surface
 from storage.readers.gltf.scene_tree import Group, Tree
 
@@ -28,10 +28,10 @@ def document_notes(
         said.append(f"{_are(apart, 'mesh', 'meshes')} not in the scene and left out.")
     if hidden := len(tree.hidden) + flat:
         said.append(f"{_are(hidden, 'mesh', 'meshes')} hidden by the file and left out.")
-    lights = _extension(document, "KHR_lights_punctual").get("lights")
+    lights = [_extension(document, name).get("lights") for name in LIGHTS]
     for count, one in (
         (_entries(document, "cameras"), "camera"),
-        (len(lights) if isinstance(lights, list) else 0, "light"),
+        (sum(len(each) for each in lights if isinstance(each, list)), "light"),
         (_entries(document, "animations"), "animation"),
     ):
         if count:
