@@ -36,7 +36,7 @@ class ObjectSettings(Settings):
         0.05, ge=0.005, le=0.08, description="Thickness of the plate and of the teapot's wall"
     )
     up: Literal["auto", "y", "z"] = Field(
-        "auto", description="Your mesh's upward axis; auto: y for GLB, as glTF has it, else z"
+        "auto", description="Your mesh's upward axis; auto: y for glTF, which says so, else z"
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {

@@ -32,7 +32,7 @@ class MeshSettings(Settings):
         description="Thickness of the fur in mesh units; by default 6 % of the mesh's radius",
     )
     up: Literal["auto", "y", "z"] = Field(
-        "auto", description="The mesh's upward axis; auto: y for GLB, as glTF has it, else z"
+        "auto", description="The mesh's upward axis; auto: y for glTF, which says so, else z"
     )
     repeats: float = Field(
         1.0,
