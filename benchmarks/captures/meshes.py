@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.captures import obj_meshes, ply_meshes, stl_meshes
+from benchmarks.captures import mesh_colours, obj_meshes, ply_meshes, stl_meshes
 from benchmarks.captures.case import FILES, Case
 from benchmarks.captures.mesh_truth import packed, read_for_glass
 
@@ -22,6 +22,7 @@ def _is_a_ball_of_glass(found: Any) -> bool:
 CASES: tuple[Case, ...] = (
     *obj_meshes.CASES,
     *ply_meshes.CASES,
+    *mesh_colours.CASES,
     *stl_meshes.STL_CASES,
     *stl_meshes.OTHER_CASES,
     Case(

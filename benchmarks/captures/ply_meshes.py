@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.captures.case import Case, Ending
 from benchmarks.captures.mesh_truth import (
@@ -22,34 +21,14 @@ from benchmarks.captures.mesh_truth import (
     rows_of,
     text,
 )
-from storage.readers.meshes import read_mesh, read_polygons
+from storage.readers.meshes import read_mesh
 
 _XYZ = ("float x", "float y", "float z")
-_RGB = ("uchar red", "uchar green", "uchar blue")
 _LISTS = ("list uchar int vertex_indices",)
 _SOLID = has_triangles(SOLID, SIDES)
-_CODES = np.array(
-    [
-        [200, 10, 0],
-        [0, 255, 30],
-        [7, 0, 128],
-        [255, 255, 255],
-        [90, 60, 0],
-        [1, 2, 3],
-        [50, 50, 200],
-    ]
-)
 _FACES = rows_of(np.full(10, 3), SIDES)
 _HEAD = ply_head("ascii", _XYZ, _LISTS, (7, 10))
 _BODY = "end_header\n" + rows_of(SOLID) + _FACES
-
-
-class _Polygons:
-    """A mesh before it is cut: its corners' colours are not lost yet."""
-
-    def __init__(self, path: Path) -> None:
-        self.mesh = read_polygons(path)
-        self.notes = self.mesh.notes
 
 
 def _case(
@@ -64,31 +43,6 @@ def _case(
     return Case(name, kind, read, ends, says, is_right if ends != "refused" else None, write)
 
 
-def _linear(codes: NDArray[np.floating]) -> NDArray[np.float64]:
-    """sRGB's curve (IEC 61966-2-1) for shares in [0, 1]."""
-    return np.array(
-        [
-            [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in row]
-            for row in codes
-        ]
-    )
-
-
-def _colours_are(
-    rows: NDArray[np.float64], opacity: float = 1.0, of_faces: bool = False
-) -> Callable[[Any], bool]:
-    """Whether corners have these linear colours of their vertices, or of their triangles."""
-
-    def is_right(found: Any) -> bool:
-        mesh = found.mesh
-        index = np.repeat(np.arange(10), 3) if of_faces else SIDES.ravel()
-        positions = np.allclose(mesh.positions[mesh.corners], SOLID[SIDES.ravel()])
-        wanted = np.column_stack([rows[index], np.full(30, opacity)])
-        return bool(positions and np.allclose(mesh.corner_colours, wanted, atol=1e-6))
-
-    return is_right
-
-
 def _binary(order: str, vertex: str, face: str, *columns: Any, head: str = "") -> bytes:
     """Rows packed by ``struct``'s letters, under a header."""
     data = "".join(
@@ -100,11 +54,6 @@ def _binary(order: str, vertex: str, face: str, *columns: Any, head: str = "") -
 
 def _head(kind: str, vertex: Sequence[str] = _XYZ, face: Sequence[str] = _LISTS) -> str:
     return ply_head(kind, vertex, face, (7, 10)) + "end_header\n"
-
-
-def _coloured(names: Sequence[str], values: Any) -> Callable[[Path], object]:
-    head = ply_head("ascii", (*_XYZ, *names), _LISTS, (7, 10)) + "end_header\n"
-    return text(head + rows_of(SOLID, values) + _FACES)
 
 
 def _strips(rows: Sequence[Sequence[int]]) -> Callable[[Path], object]:
@@ -145,56 +94,6 @@ CASES = (
         "triangle strips",
         _strips([[0, 1, 2, 3, -1, 2, 3, 4, -1, 1, 5, 0, -1]]),
         is_right=has_triangles(SOLID, _STRIP_TRIANGLES),
-    ),
-    _case(
-        "colours_byte.ply",
-        "colours of vertices",
-        _coloured(_RGB, _CODES),
-        is_right=_colours_are(_linear(_CODES / 255)),
-        read=_Polygons,
-    ),
-    _case(
-        "colours_short.ply",
-        "colours of vertices",
-        _coloured(("ushort red", "ushort green", "ushort blue"), _CODES * 257),
-        is_right=_colours_are(_linear(_CODES / 255)),
-        read=_Polygons,
-    ),
-    _case(
-        "colours_float.ply",
-        "colours of vertices",
-        _coloured(("float red", "float green", "float blue"), _CODES / 255),
-        is_right=_colours_are(_linear(_CODES / 255)),
-        read=_Polygons,
-    ),
-    _case(
-        "colours_diffuse_alpha.ply",
-        "colours of vertices",
-        _coloured(
-            [f"uchar diffuse_{name}" for name in ("red", "green", "blue", "alpha")],
-            np.column_stack([_CODES, np.full(7, 51)]),
-        ),
-        is_right=_colours_are(_linear(_CODES / 255), 0.2),
-        read=_Polygons,
-    ),
-    _case(
-        "colours_of_faces.ply",
-        "colours of faces",
-        text(
-            ply_head("ascii", _XYZ, (*_LISTS, *_RGB), (7, 10))
-            + "end_header\n"
-            + rows_of(SOLID)
-            + rows_of(np.full(10, 3), SIDES, _CODES[[0, 1, 2, 3, 4, 5, 6, 0, 1, 2]])
-        ),
-        is_right=_colours_are(_linear(_CODES[[0, 1, 2, 3, 4, 5, 6, 0, 1, 2]] / 255), of_faces=True),
-        read=_Polygons,
-    ),
-    _case(
-        "colours_for_fur.ply",
-        "colours of vertices",
-        _coloured(_RGB, _CODES),
-        "told",
-        ["Colours of its vertices are not used"],
     ),
     _case(
         "big_endian.ply",
@@ -278,6 +177,16 @@ CASES = (
         ["Numbers at the ends of its lines left out"],
     ),
     _case(
+        "capitals.ply",
+        "names of properties",
+        text(
+            ply_head("ascii", ("FLOAT X", "FLOAT Y", "FLOAT Z"), _LISTS, (7, 10)).replace(
+                "vertex_indices", "vertexIndices"
+            )
+            + _BODY
+        ),
+    ),
+    _case(
         "obj_info.ply",
         "headers",
         text(_HEAD.replace("1.0\n", "1.0\nobj_info num_cols 512\ncomment zipper\n") + _BODY),
@@ -359,7 +268,9 @@ CASES = (
         "cloud.ply",
         "points without faces",
         text(
-            ply_head("ascii", (*_XYZ, *_RGB), (), (7, 0)) + "end_header\n" + rows_of(SOLID, _CODES)
+            ply_head("ascii", (*_XYZ, "float nx", "float ny", "float nz"), (), (7, 0))
+            + "end_header\n"
+            + rows_of(SOLID, np.full((7, 3), 9))
         ),
         "refused",
         ["7 points without faces", "Poisson"],

@@ -146,7 +146,7 @@ class _Content:
             except ValueError:
                 numbers = []
         if len(numbers) < count:
-            raise ValueError(f"{count} numbers")
+            raise ValueError(f"{count} numbers, such as 1.5 or 2e-3")
         return numbers
 
     def mesh(self, file: Path, parts: NDArray[np.int64]) -> PolygonMesh:

@@ -22,7 +22,6 @@ _Columns = Mapping[str, NDArray[np.float64] | Lists]
 
 # No standard says these names: they are the habits of programs.
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-_CORNERS = ("vertex_indices", "vertex_index")
 _COLOURS = (
     ("red", "green", "blue", "alpha"),
     ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
@@ -83,7 +82,8 @@ def read_ply(file: Path) -> PolygonMesh:
 
 def _corners(file: Path, columns: _Columns, one: str) -> Lists:
     """The lists of vertices of polygons or strips, all whole numbers; none where there are none."""
-    lists = next((columns[name] for name in _CORNERS if name in columns), None)
+    # vertex_indices, vertex_index, vertexIndices …
+    lists = next((values for name, values in columns.items() if name.startswith("vert")), None)
     if not isinstance(lists, Lists):
         return Lists(np.zeros(0, np.int64), np.zeros(0))
     known = np.where(np.abs(lists.values) < 2**53, lists.values, 0.5)

@@ -113,7 +113,7 @@ def _header(file: Path, lines: list[str]) -> tuple[list[Element], str]:
             if words[:1] == ["format"]:
                 order = _BYTE_ORDERS[words[1]]
             elif words[:1] == ["element"]:
-                elements.append(Element(words[1], int(words[2]), []))
+                elements.append(Element(words[1].lower(), int(words[2]), []))
             elif words[:1] == ["property"]:
                 elements[-1].properties.append(_property(words[1:], order or ""))
         except (KeyError, IndexError, ValueError):
@@ -128,8 +128,8 @@ def _property(words: list[str], order: str) -> Property:
         return np.dtype(order + _TYPES[word.lower()])
 
     if words[0] == "list":
-        return Property(words[3], type_of(words[2]), type_of(words[1]))
-    return Property(words[1], type_of(words[0]), None)
+        return Property(words[3].lower(), type_of(words[2]), type_of(words[1]))
+    return Property(words[1].lower(), type_of(words[0]), None)
 
 
 class _AsciiBody:
