@@ -30,6 +30,7 @@ class Assembly:
     primitives: the JSON of each primitive of the file.
     flat: how many nodes or instances are scaled to nothing, which hides them.
     leftover: corners that made no whole triangle.
+    clamped: vertices whose colours were not in [0, 1].
     """
 
     def __init__(self, accessors: Accessors, world: NDArray[np.float64]) -> None:
@@ -40,7 +41,7 @@ class Assembly:
         self._first_rows = np.cumsum([0, *(len(mesh["primitives"]) for mesh in meshes)])
         self._joints: dict[int, NDArray[np.float64]] = {}
         self._placed: list[_Placed] = []
-        self.flat = self.leftover = 0
+        self.flat = self.leftover = self.clamped = 0
 
     def place(self, group: Group) -> None:
         """Add a mesh wherever the nodes of a group put it."""
@@ -62,6 +63,7 @@ class Assembly:
                 group.weights, skinned=group.skin is not None
             )
             self.leftover += geometry.leftover
+            self.clamped += geometry.clamped
             if group.skin is None or geometry.joints is None or geometry.weights is None:
                 places = self._world[group.nodes] if group.skin is not None else matrices
                 self._placed.append(_by_matrices(geometry, places, row))

@@ -49,8 +49,11 @@ def document_notes(
     return said
 
 
-def mesh_notes(document: dict[str, Any], groups: list[Group], leftover: int) -> list[str]:
-    """``leftover``: vertices that make no whole triangle."""
+def mesh_notes(
+    document: dict[str, Any], groups: list[Group], leftover: int, clamped: int
+) -> list[str]:
+    """``leftover``: corners that make no whole triangle; ``clamped``: vertices whose colours were
+    not from 0 to 1."""
     said = []
     if skinned := len({group.mesh for group in groups if group.skin is not None}):
         said.append(f"{_many(skinned, 'mesh', 'meshes')} with a skin: posed as the joints stand.")
@@ -70,6 +73,8 @@ def mesh_notes(document: dict[str, Any], groups: list[Group], leftover: int) -> 
         said.append(f"{_are(bare, 'primitive')} without positions and left out.")
     if leftover:
         said.append(f"{_many(leftover, 'last corner')} made no whole triangle: left out.")
+    if clamped:
+        said.append(f"Colours of {_many(clamped, 'vertex', 'vertices')} clamped to 0 to 1.")
     names = sorted({name for entry in surfaces for name in entry["attributes"]})
     if unknown := [name for name in names if not _KNOWN_ATTRIBUTES.fullmatch(name)]:
         said.append(f"Attributes of vertices that are not read: {_listed(unknown)}.")

@@ -15,6 +15,7 @@ from storage.readers.gltf.document import DRACO
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
+_ROUNDING = 1e-3
 _UV = re.compile(r"TEXCOORD_([0-9]{1,3})")
 _JOINTS = re.compile(r"JOINTS_([0-9]{1,3})")
 
@@ -23,7 +24,8 @@ class Geometry(NamedTuple):
     """``positions`` (V, 3) float64; ``triangles`` (T, 3) int64; ``uvs``, by the number of their
     set, (V, 2) float64, v from the bottom; ``colours`` (V, 4) float64 in [0, 1], or None;
     ``joints`` (V, J) int64 and ``weights`` (V, J) float64, of a skin, or None; ``leftover``,
-    vertices at the end that make no whole triangle."""
+    vertices at the end that make no whole triangle; ``clamped``, vertices whose colours were not in
+    [0, 1]."""
 
     positions: NDArray[np.float64]
     triangles: NDArray[np.int64]
@@ -32,6 +34,7 @@ class Geometry(NamedTuple):
     joints: NDArray[np.int64] | None
     weights: NDArray[np.float64] | None
     leftover: int
+    clamped: int
 
 
 def is_surface(primitive: dict[str, Any]) -> bool:
@@ -79,9 +82,8 @@ class Primitive:
             uvs[row] = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
         triangles, leftover = self._triangles(len(positions))
         joints, proportions = self._skinning() if skinned else (None, None)
-        return Geometry(
-            positions, triangles, uvs, self._colours(active), joints, proportions, leftover
-        )
+        colours, clamped = self._colours(active)
+        return Geometry(positions, triangles, uvs, colours, joints, proportions, leftover, clamped)
 
     def _unpacked(self) -> DracoMesh | None:
         packed = self._entry.get("extensions", {}).get(DRACO)
@@ -127,15 +129,18 @@ class Primitive:
                 values[:, :width] += weight * moved[:, :width]
         return values
 
-    def _colours(self, active: list[tuple[dict[str, int], float]]) -> NDArray[np.float64] | None:
+    def _colours(
+        self, active: list[tuple[dict[str, int], float]]
+    ) -> tuple[NDArray[np.float64] | None, int]:
         accessor = self._entry["attributes"].get("COLOR_0")
         if accessor is None:
-            return None
+            return None, 0
         values = self._morphed("COLOR_0", (3, 4), active)
         values /= self._accessors.largest(accessor)  # integers are normalised, said or not
         colours = np.ones((len(values), 4))
         colours[:, : values.shape[1]] = np.clip(np.nan_to_num(values, nan=1.0), 0.0, 1.0)
-        return colours
+        within = (values > -_ROUNDING) & (values < 1 + _ROUNDING)
+        return colours, int((~within.all(axis=1)).sum())
 
     def _skinning(self) -> tuple[NDArray[np.int64], NDArray[np.float64]] | tuple[None, None]:
         joints, weights = [], []

@@ -73,6 +73,6 @@ def read_gltf(file: Path) -> GltfFile:
         for group in drawn:
             assembly.place(group)
     said = document_notes(document, tree, drawn, assembly.flat)
-    said += mesh_notes(document, drawn, assembly.leftover)
+    said += mesh_notes(document, drawn, assembly.leftover, assembly.clamped)
     mesh, uvs = assembly.joined(tuple(said))
     return GltfFile(mesh, assembly.primitives, document, uvs, buffers)

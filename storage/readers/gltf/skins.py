@@ -47,12 +47,11 @@ def posed(
 
     Vertices without weights follow their first joint. Raises BadInput for joints that are none.
     """
-    if len(matrices) == 0 or joints.max(initial=0) >= len(matrices) or joints.min(initial=0) < 0:
-        wrong = joints[(joints < 0) | (joints >= len(matrices))]
-        if (weights[(joints < 0) | (joints >= len(matrices))] != 0).any() or len(matrices) == 0:
-            found = f"a reference to joint {wrong[0] if wrong.size else 0}"
-            raise BadInput(file, "JOINTS of a vertex", found, f"joints 0 to {len(matrices) - 1}")
-        joints = np.where((joints < 0) | (joints >= len(matrices)), 0, joints)
+    wrong = (joints < 0) | (joints >= len(matrices))
+    if (wrong & (weights != 0)).any() or len(matrices) == 0:
+        found = f"a reference to joint {joints[wrong][0]}" if wrong.any() else "a skin without any"
+        raise BadInput(file, "a joint", found, f"one of joints 0 to {len(matrices) - 1}")
+    joints = np.where(wrong, 0, joints)  # without weight, writers leave what they like
     total = weights.sum(axis=1, keepdims=True)
     shares = np.divide(weights, total, out=np.zeros_like(weights), where=total > 0)
     shares[:, 0] += (total <= 0)[:, 0]

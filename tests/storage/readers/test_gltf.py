@@ -105,7 +105,9 @@ def test_colours_are_from_zero_to_one(tmp_path: Path) -> None:
     made = GltfWriter()
     colours = np.array([[-1, 0.5, 2], [np.nan, 0, 0], [0, 0, 0], [1, 1, 1], [0, 0, 0]], np.float32)
     made.node(mesh=made.mesh(made.primitive(COLOR_0=made.accessor(colours))))
-    read_colours = read(made, tmp_path).mesh.corner_colours
+    mesh = read(made, tmp_path).mesh
+    assert mesh.notes == ("Colours of 2 vertices clamped to 0 to 1.",)
+    read_colours = mesh.corner_colours
     assert read_colours is not None
     expected = np.clip(np.nan_to_num(colours, nan=1.0), 0, 1)[SIDES.ravel()]
     np.testing.assert_allclose(read_colours, np.column_stack([expected, np.ones(18)]))
