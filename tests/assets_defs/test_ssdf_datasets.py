@@ -23,6 +23,7 @@ from pipelines.ssdf_lighting.figures import CompressionErrors
 from pipelines.ssdf_lighting.light.environment_fit import Fit
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import Scene, built_in_scene
+from pipelines.ssdf_lighting.surface_textures import SurfaceTextures, Texture, TexturedMaterial
 from storage.schemas import ssdf_lighting as schemas
 
 N = 16
@@ -56,6 +57,39 @@ def test_a_scene_comes_back(scene: Scene) -> None:
     assert_same(
         found._replace(materials=None, notes=None), noted._replace(materials=None, notes=None)
     )
+
+
+def test_a_scene_with_textures_comes_back(scene: Scene) -> None:
+    rng = np.random.default_rng(0)
+    wide, high = (rng.integers(0, 256, (*size, 3), np.uint8) for size in ((2, 5), (7, 3)))
+    material = TexturedMaterial(1, (1.0, 0.5, 0.25), 0.75, (0.04, 0.03, 0.02), 0.5)
+    textures = SurfaceTextures(
+        rng.random((len(scene.triangles), 3, 2, 2), np.float32),
+        rng.random((len(scene.triangles), 3, 3), np.float32),
+        (
+            material._replace(row=0),
+            material._replace(
+                colour=Texture(wide, ("clamp", "mirror"), 1), normal=Texture(high), bend=0.5
+            ),
+        ),
+    )
+    tint = np.array([[1.5, 1.0, 0.5]] * 3)
+    shown = scene._replace(textures=textures, materials=scene.materials._replace(tint=tint))
+    found = datasets.scene_of(schemas.SCENE_MESH.conform(datasets.scene_dataset(shown, "court")))
+    assert_same(found.materials, shown.materials)
+    assert found.textures is not None
+    np.testing.assert_array_equal(found.textures.uvs, textures.uvs)
+    np.testing.assert_array_equal(found.textures.colours, textures.colours)
+    plain, painted = found.textures.materials
+    assert plain == textures.materials[0]
+    assert painted._replace(colour=None, normal=None) == textures.materials[1]._replace(
+        colour=None, normal=None
+    )
+    assert painted.colour is not None
+    assert painted.normal is not None
+    assert (painted.colour.wrap, painted.colour.mapping) == (("clamp", "mirror"), 1)
+    np.testing.assert_array_equal(painted.colour.texels, wide)
+    np.testing.assert_array_equal(painted.normal.texels, high)
 
 
 def test_what_vertices_see_comes_back(scene: Scene) -> None:

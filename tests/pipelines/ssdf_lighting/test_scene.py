@@ -16,6 +16,7 @@ from pipelines.ssdf_lighting.scene import (
     make_scene,
     split_by_part,
 )
+from pipelines.ssdf_lighting.surface_textures import SurfaceTextures, TexturedMaterial
 
 Floats = NDArray[np.float64]
 
@@ -208,3 +209,41 @@ def two_colours() -> Scene:
     scene = make_scene(ball.vertices, ball.triangles, right, TWO)
     assert len(split_by_part(scene).source) > len(scene.vertices)
     return scene
+
+
+def test_textures_stay_where_they_are_through_repair_and_refinement() -> None:
+    """Corners know their place in the texture: here it is their own position, x and y."""
+    flat = shapes.square(3)
+    triangles = flat.triangles.copy()
+    triangles[4] = triangles[4, ::-1]  # turned over: the repair turns it back
+    triangles = np.concatenate([triangles[:2], [[0, 0, 1]], triangles[2:], triangles[:1]])
+    places = flat.vertices[triangles][..., None, :2].repeat(2, axis=2).astype(np.float32)
+    colours = (flat.vertices[triangles] + 0.5).astype(np.float32)
+    material = TexturedMaterial(0, (1.0, 1.0, 1.0), 0.0, (0.0, 0.0, 0.0), 1.0)
+    textures = SurfaceTextures(places, colours, (material,))
+    part = np.zeros(len(triangles), int)
+    for longest in (np.inf, 0.2):
+        scene = make_scene(flat.vertices, triangles, part, ONE, textures, longest)
+        assert scene.textures is not None
+        given = scene.vertices * scene.scale + scene.middle
+        np.testing.assert_allclose(
+            scene.textures.uvs[:, :, 1], given[scene.triangles][..., :2], atol=1e-6
+        )
+        np.testing.assert_allclose(scene.textures.colours, given[scene.triangles] + 0.5, atol=1e-6)
+        mesh, source = split_by_part(scene)
+        assert mesh.textures is not None
+        assert (np.diff(source) >= 0).all()  # as whoever knows the distances needs them
+        np.testing.assert_array_equal(mesh.vertices, scene.vertices[source])
+        drawn = mesh.vertices * scene.scale + scene.middle
+        np.testing.assert_allclose(mesh.textures.uvs[:, 0], drawn[:, :2], atol=1e-6)
+
+
+def test_a_seam_of_the_texture_doubles_drawn_vertices_only() -> None:
+    flat = shapes.square(1)
+    uvs = np.zeros((2, 3, 2, 2), np.float32)
+    uvs[1] = 0.5
+    material = TexturedMaterial(0, (1.0, 1.0, 1.0), 0.0, (0.0, 0.0, 0.0), 1.0)
+    textures = SurfaceTextures(uvs, np.ones((2, 3, 3), np.float32), (material,))
+    scene = make_scene(flat.vertices, flat.triangles, [0, 0], ONE, textures)
+    assert len(scene.vertices) == 4
+    assert len(split_by_part(scene).source) == 6
