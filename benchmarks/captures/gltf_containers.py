@@ -173,6 +173,11 @@ def _two_buffers(path: Path) -> None:
     path.write_bytes(glb(made.json(), made.binary[: PYRAMID.nbytes] + bytes(np.uint8(40))))
 
 
+def _windows_names(text: bytes, binary: bytes) -> bytes:
+    named = json.loads(text) | {"materials": [{"name": "Würfel"}]}
+    return glb(json.dumps(named, ensure_ascii=False).encode("cp1252"), binary)
+
+
 def _four_zeros(text: bytes, binary: bytes) -> bytes:
     return glb(text, binary + bytes(3), (b"ACME", b"of our own"))
 
@@ -203,6 +208,7 @@ CONTAINERS: tuple[Case, ...] = (
     _read("gltf_bom.gltf", "JSON of other writers", _with_uri(_standard, b"\xef\xbb\xbf".__add__)),
     _read("gltf_fractions.gltf", "JSON of other writers", _changed(_numbers_as_fractions)),
     _read("gltf_nulls.gltf", "JSON of other writers", _changed(_nulls)),
+    _read("gltf_cp1252.glb", "JSON of other writers", _glb_with(_windows_names)),
     _read("gltf_2_1.glb", "later versions of glTF", _changed(_asset(version="2.1"))),
     _refused(
         "gltf_needs_2_1.glb", "later versions of glTF",

@@ -295,6 +295,10 @@ GEOMETRY: tuple[Case, ...] = (
         "gltf_lines_too.glb", "points and lines in glTF", _with_lines,
         "2 primitives are of points or lines and left out",
     ),
+    built_refused(
+        "gltf_points.glb", "points and lines in glTF", _with_mode(0, None),
+        "1 primitive is of points or lines", "of points, make a mesh before",
+    ),
     built(
         "gltf_half_a_triangle.glb", "corners without a triangle", _one_corner_more,
         "1 last corner made no whole triangle",

@@ -296,6 +296,10 @@ SCENES: tuple[Case, ...] = (
     _case("gltf_second_scene.glb", "several scenes", _two_scenes(scene=1),
           "1 other scene is left out", right=_at(moved(9, 0, 0))),
     _case("gltf_first_scene.glb", "several scenes", _first_scene, "1 other scene is left out"),
+    _refused(
+        "gltf_empty_scene.glb", "nothing in the scene", _nodes({"mesh": 0}, scenes=[{}]),
+        "without triangles. 1 mesh is not in the scene", "export the mesh in it",
+    ),
     _case("gltf_without_scenes.glb", "no scene", _without_scenes, right=_at(*_BOTH)),
     _case(
         "gltf_instances.glb", "instances", _turned_instances,

@@ -44,11 +44,19 @@ def opened(file: Path) -> Container:
         return f'"{_PLACEHOLDER}{len(embedded) - 1}"'.encode()
 
     text = _EMBEDDED.sub(set_aside, text)  # whole meshes and pictures, a hundred times the JSON
+    text = text.rstrip(b"\0 ")
     try:
-        description = parsed_json(text.rstrip(b"\0 "))
+        description = _parsed(text)
     except ValueError as error:
         raise BadInput(file, "content", f"damaged JSON ({error})", _WHOLE) from None
     return Container(description, binary, tuple(embedded), len(data))
+
+
+def _parsed(text: bytes) -> Any:
+    try:
+        return parsed_json(text)
+    except UnicodeDecodeError:  # names in the encoding of a writer's Windows
+        return parsed_json(text.decode("cp1252", "replace").encode())
 
 
 def _chunks(file: Path, data: bytes) -> tuple[bytes, bytes | None]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from storage.readers.bad_input import BadInput
 from storage.readers.gltf.accessors import Accessors
 from storage.readers.gltf.assembly import Assembly
 from storage.readers.gltf.buffers import Buffers
@@ -57,7 +58,8 @@ def read_gltf(file: Path) -> GltfFile:
     their triangles over. What is left out the mesh's ``notes`` say.
 
     Raises BadInput for a file that is truncated, damaged, of another version or takes too much
-    memory, whose buffers are missing or on the network, and that requires an unknown extension.
+    memory, whose scene has no triangles, whose buffers are missing or on the network, and that
+    requires an unknown extension.
     """
     container = opened(file)
     check_version(file, container.description)
@@ -75,4 +77,8 @@ def read_gltf(file: Path) -> GltfFile:
     said = document_notes(document, tree, drawn, assembly.flat)
     said += mesh_notes(document, drawn, assembly.leftover, assembly.clamped)
     mesh, uvs = assembly.joined(tuple(said))
+    if len(mesh.sizes) == 0:
+        found = f"without triangles. {said[0]}" if said else "without triangles in its scene"
+        expected = "a scene with triangles: export the mesh in it (of points, make a mesh before)"
+        raise BadInput(file, "content", found.rstrip("."), expected)
     return GltfFile(mesh, assembly.primitives, document, uvs, buffers)

@@ -304,7 +304,7 @@ REFUSED: list[tuple[str, str, Callable[[Path], Any]]] = [
     ("points.ply", "as by screened Poisson", text(ply_text(None, ""))),
     ("splats.ply", "content is 3D Gaussian splats", text(SPLATS)),
     ("points.obj", "content is 4 points without faces", text(CORNERS)),
-    ("points.glb", "content is 0 points", packed(glb_bytes([{"mesh": 0}], mode=0))),
+    ("points.glb", "content is without triangles", packed(glb_bytes([{"mesh": 0}], mode=0))),
     ("empty.obj", "content is 0 points", text("")),
     ("pair.obj", "face 0 is of 2 corners; expected at least three", text(CORNERS + "f 1 2\n")),
     ("pair.ply", "face 0 is of 2 corners", text(ply_text(None, "2 0 1\n"))),
