@@ -42,6 +42,9 @@ def _named_pictures() -> list[Case]:
 
     encoded = pictures(64, 66)
     broken = encoded["tagged.png"].replace(b"MM\0*", b"XX\0*").replace(b"II*\0", b"XX*\0")
+    deep = encoded["deep.png"]
+    length = deep.index(b"IDAT") - 4
+    endless = deep[:length] + b"\xff\0\0\0" + deep[length + 4 :]
     zeros = cv2.imencode(".png", np.zeros((8_000, 8_000), np.uint8))[1].tobytes()
     grey = cv2.imencode(
         ".jpg", np.zeros((3000, 3000), np.uint8), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]
@@ -49,6 +52,7 @@ def _named_pictures() -> list[Case]:
     last = grey[grey.rindex(b"\xff\xda") : -2]
     return [
         Case("broken EXIF", "photograph", "a.png", {"a.png": with_png_checksums(broken)}),
+        Case("endless chunk", "photograph", "a.png", {"a.png": endless}),
         Case("unfolding PNG", "photograph", "a.png", {"a.png": zeros}),
         Case(
             "endless scans",

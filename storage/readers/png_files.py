@@ -38,7 +38,7 @@ def read_png(file: Path) -> StoredPicture:
     """Read a PNG file as it is stored. Raises BadInput, and nearly anything for what is damaged."""
     from PIL import PngImagePlugin
 
-    data, damage_notes = _without_damaged_extras(file.read_bytes())
+    data, damage_notes = _without_damaged_extras(file, file.read_bytes())
     deep = data[24] == 16  # the header chunk's bit depth
     image = load(file, PngImagePlugin.PngImageFile, io.BytesIO(data), 8 if deep else 4)
     if _END not in data[-4096:] and _END not in data:
@@ -105,13 +105,16 @@ def _by_its_chunks(file: Path, stored: StoredPicture, data: bytes, info: Any) ->
     return stored._replace(values=colours, notes=(*stored.notes, f"{note}."))
 
 
-def _without_damaged_extras(data: bytes) -> tuple[bytes, tuple[str, ...]]:
+def _without_damaged_extras(file: Path, data: bytes) -> tuple[bytes, tuple[str, ...]]:
     """The file without chunks that pixels do not need and whose checksums are wrong; libpng leaves
-    them out, too, and Pillow would refuse the file."""
+    them out, too, and Pillow would refuse the file. Raises BadInput for a chunk that goes on behind
+    the file's end: OpenCV takes the memory that one announces."""
     kept, at, names = [data[:8]], 8, []
     while at + 12 <= len(data):
         end = at + 12 + int.from_bytes(data[at : at + 4], "big")
-        if end > len(data) or data[at + 4 : at + 8] == b"IEND":
+        if end > len(data):
+            raise damaged(file, "PNG")
+        if data[at + 4 : at + 8] == b"IEND":
             break
         is_extra = bool(data[at + 4] & 0x20)
         checksum = int.from_bytes(data[end - 4 : end], "big")
