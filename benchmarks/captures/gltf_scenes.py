@@ -298,7 +298,7 @@ SCENES: tuple[Case, ...] = (
     _case("gltf_first_scene.glb", "several scenes", _first_scene, "1 other scene is left out"),
     _refused(
         "gltf_empty_scene.glb", "nothing in the scene", _nodes({"mesh": 0}, scenes=[{}]),
-        "without triangles. 1 mesh is not in the scene", "export the mesh in it",
+        "without triangles: 1 mesh is not in the scene", "export the mesh in it",
     ),
     _case("gltf_without_scenes.glb", "no scene", _without_scenes, right=_at(*_BOTH)),
     _case(

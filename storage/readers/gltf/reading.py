@@ -78,7 +78,7 @@ def read_gltf(file: Path) -> GltfFile:
     said += mesh_notes(document, drawn, assembly.leftover, assembly.clamped)
     mesh, uvs = assembly.joined(tuple(said))
     if len(mesh.sizes) == 0:
-        found = f"without triangles. {said[0]}" if said else "without triangles in its scene"
+        found = f"without triangles: {said[0]}" if said else "without triangles in its scene"
         expected = "a scene with triangles: export the mesh in it (of points, make a mesh before)"
         raise BadInput(file, "content", found.rstrip("."), expected)
     return GltfFile(mesh, assembly.primitives, document, uvs, buffers)
