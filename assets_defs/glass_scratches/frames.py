@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipelines.geometry.solids import Solid
+    from pipelines.glass_scratches.drawing.frames import GlassFrames
     from storage.readers.environments import EnvironmentFile
 
 _ENVIRONMENT_HEIGHT = 512
@@ -199,6 +200,11 @@ def _frame_pictures(dataset: xr.Dataset) -> Pictures:
     }
 
 
+def _figures(frames: GlassFrames, dataset: xr.Dataset) -> dict[str, float]:
+    noise = float(dataset["error"].values[1].mean())
+    return {"rays": frames.far.rays + frames.close.rays, "noise, close": noise}
+
+
 def _not_finite(version: StoredVersion) -> float:
     from pipelines.glass_scratches.figures import impossible_share
 
@@ -310,6 +316,4 @@ def glass_frames(
         progress=progress,
     )
     dataset = frames_dataset(frames)
-    noise = float(dataset["error"].values[1].mean())
-    rays = frames.far.rays + frames.close.rays
-    return dataset, {"rays": rays, "noise, close": noise, NOTES: light.notes}
+    return dataset, {**_figures(frames, dataset), NOTES: light.notes}
