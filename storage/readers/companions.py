@@ -15,8 +15,7 @@ from os import PathLike
 from pathlib import Path
 
 from storage.readers.bad_input import BadInput
-from storage.readers.gltf.container import referred_uris, spellings
-from storage.readers.references import file_beside
+from storage.readers.references import file_beside, spellings
 
 _TEXTURES = re.compile(r"(map_\w+|bump|disp|decal|refl|norm)", re.IGNORECASE)
 _GLTF = (".gltf", ".glb")
@@ -75,6 +74,8 @@ def _referred(file: Path, ending: str) -> list[Path]:
 def _references(file: Path, ending: str, size: int, changed: int) -> list[tuple[str, ...]]:
     """The words of each line that refers to files; read once for each state of the file."""
     if ending in _GLTF:
+        from storage.readers.gltf.container import referred_uris  # brings numpy
+
         return [(uri,) for uri in referred_uris(file)]
     if ending == ".ply":
         with file.open("rb") as stream:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from urllib.parse import unquote
 
 
 def file_beside(file: Path, name: str) -> Path | None:
@@ -14,3 +15,8 @@ def file_beside(file: Path, name: str) -> Path | None:
         if os.path.isfile(there):  # False, unlike Path's, for names too long to be one
             return Path(there)
     return None
+
+
+def spellings(uri: str) -> list[str]:
+    """A relative URI as the name of a file: without its percent signs, and as it stands."""
+    return list(dict.fromkeys((unquote(uri), uri)))

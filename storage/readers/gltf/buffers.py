@@ -8,10 +8,10 @@ from typing import Any
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.gltf.compression import meshopt_bytes
-from storage.readers.gltf.container import Container, data_of, spellings
+from storage.readers.gltf.container import Container, data_of
 from storage.readers.gltf.document import MESHOPT
 from storage.readers.opening import check_file, whole_file
-from storage.readers.references import file_beside
+from storage.readers.references import file_beside, spellings
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 _LARGEST_IMAGE = 256 << 20

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import unquote, unquote_to_bytes
+from urllib.parse import unquote_to_bytes
 
 from storage.readers.bad_input import BadInput
 from storage.readers.opening import parsed_json, whole_file
@@ -114,11 +114,6 @@ def _from_base64(text: bytes) -> bytes:
         return base64.b64decode(plain + b"=" * (-len(plain) % 4), validate=True)
     except binascii.Error:
         raise ValueError("no base64") from None
-
-
-def spellings(uri: str) -> list[str]:
-    """A relative URI as the name of a file: without its percent signs, and as it stands."""
-    return list(dict.fromkeys((unquote(uri), uri)))
 
 
 def referred_uris(file: Path) -> list[str]:
