@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
 from storage.readers.environments import read_environment
-from storage.readers.scenes import read_scene
+from storage.readers.scenes import check_scene
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ ENVIRONMENTS = ("sky", "lamps")
 
 def _check_scene(source: Source, settings: Mapping[str, Any]) -> None:
     if source.path is not None:
-        read_scene(source.path)
+        check_scene(source.path)
 
 
 def _check_environment(source: Source, settings: Mapping[str, Any]) -> None:

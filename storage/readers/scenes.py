@@ -26,7 +26,7 @@ from storage.readers.polygons import PolygonMesh, triangulate
 from storage.readers.references import file_beside
 from storage.readers.usable_polygons import usable_polygons
 
-__all__ = ["Material", "SceneFile", "default_material", "read_scene"]
+__all__ = ["Material", "SceneFile", "check_scene", "default_material", "read_scene"]
 
 _NOT_USED = re.compile(r"\d+ textures? not used")
 """What the reader of PLY says of the texture that is used here."""
@@ -97,14 +97,22 @@ def read_scene(path: str | PathLike[str]) -> SceneFile:
     missing or no numbers, naming the library; and for factors of a glTF's material that are.
     """
     file = Path(path)
+    return _scene(file, _described(file))
+
+
+def check_scene(path: str | PathLike[str]) -> None:
+    """Raise BadInput as `read_scene`, without looking into textures: these refuse nothing."""
+    file = Path(path)
+    usable_polygons(file, _described(file).mesh)
+
+
+def _described(file: Path) -> _Described:
     found = mesh_format(file)
     if found == "gltf":
-        described = _of_gltf(file, read_gltf(file))
-    elif found == "obj":
-        described = _of_obj(file, read_obj(file))
-    else:
-        described = _of_one_part(file, read_polygons(file))
-    return _scene(file, described)
+        return _of_gltf(file, read_gltf(file))
+    if found == "obj":
+        return _of_obj(file, read_obj(file))
+    return _of_one_part(file, read_polygons(file))
 
 
 def _scene(file: Path, described: _Described) -> SceneFile:
