@@ -125,7 +125,8 @@ def _oriented(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     if (edges.uses > 2).any():
         raise ValueError(
             f"{int((edges.uses > 2).sum())} edges are in more than two triangles; "
-            "expected two at each edge of a closed mesh: join parts that touch by a Boolean union"
+            "expected two at each edge of a closed mesh: join parts that touch by a Boolean union, "
+            "or remove non-manifold edges in Blender or MeshLab"
         )
     if (edges.uses < 2).any():
         raise ValueError(
@@ -155,7 +156,8 @@ def _depths(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64], surface: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """How many other surfaces each one lies in."""
-    parts = [triangles[surface == number] for number in range(surface.max() + 1)]
+    ends = np.cumsum(np.bincount(surface))
+    parts = np.split(triangles[np.argsort(surface, kind="stable")], ends[:-1])
     low = np.array([vertices[part].min(axis=(0, 1)) for part in parts])
     high = np.array([vertices[part].max(axis=(0, 1)) for part in parts])
     depths = np.zeros(len(parts), np.int64)
