@@ -27,7 +27,7 @@ def in_gltf(path: Path) -> Found:
     if data[:4] == b"glTF":
         text = data[20 : 20 + struct.unpack_from("<I", data, 12)[0]]
     document: dict[str, Any] = json.loads(
-        text.decode("utf-8-sig").rstrip("\0 "),
+        text.decode("utf-8-sig", "replace").rstrip("\0 "),
         object_pairs_hook=lambda pairs: {name: value for name, value in pairs if value is not None},
     )
     found: Found = {}
