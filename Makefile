@@ -44,6 +44,7 @@ docs: setup      ## docs/assets.md from the schemas; docs/inputs.md; docs/pictur
 	@$(VENV)/python -m docs.assets
 	@$(VENV)/python -m docs.inputs
 	@$(VENV)/python -m docs.pictures
+	@$(VENV)/python -m docs.textured_scene
 
 doctor: setup    ## check this machine and draw one picture
 	@$(VENV)/tsuya doctor

@@ -1,10 +1,16 @@
 """A scene with textures, all made by code: planks, bricks, a ball of tiles and a golden one.
 
-Written as OBJ with a material library and PNG files beside it, as people have them.
+Written as OBJ with a material library and PNG files beside it, as people have them; ``make docs``
+lights it in a workspace of its own for ``pictures/ssdf-textures.jpg``.
 """
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +23,8 @@ from pipelines.geometry import shapes
 FloatArray = NDArray[np.float64]
 
 _SIDE = 1024  # texels
+_SHOWN = Path(__file__).parent / "pictures" / "ssdf-textures.jpg"
+_SETTINGS = ("--set", "edge=0.03", "--set", "width=720", "--set", "frames=2")
 _LIBRARY = """newmtl planks
 Kd 1 1 1
 Ks 0.04 0.04 0.04
@@ -170,3 +178,31 @@ def _save(path: Path, values: FloatArray) -> None:
     if "-" not in path.stem:
         held = np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055)
     Image.fromarray(np.rint(held * 255).astype(np.uint8)).save(path)
+
+
+def main() -> None:
+    """Make the page's picture: as lit by the two built-in environments."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_textured_scene(folder / "courtyard.obj")
+        home = folder / "dagster"
+        home.mkdir()
+        shutil.copy(Path(".dagster") / "dagster.yaml", home)
+        places = {"TSUYA_DATA": str(folder / "data"), "DAGSTER_HOME": str(home)}
+        command = str(Path(sys.executable).with_name("tsuya"))
+        scene = ("--scene", str(folder / "courtyard.obj"))
+        run = [command, "run", "ssdf_lighting", *scene, *_SETTINGS]
+        subprocess.run(run, check=True, env=os.environ | places)
+        made = folder / "pictures" / "ssdf_lighting"
+        lit = [
+            Image.open(made / f"relit_frames-{light}.courtyard-obj-lit.png").convert("RGB")
+            for light in ("sky", "lamps")
+        ]
+        beside = Image.new("RGB", (sum(shot.width for shot in lit) + 10, lit[0].height), "white")
+        beside.paste(lit[0], (0, 0))
+        beside.paste(lit[1], (lit[0].width + 10, 0))
+        beside.save(_SHOWN, quality=88, optimize=True)
+
+
+if __name__ == "__main__":
+    main()
