@@ -56,6 +56,11 @@ def valid_cases() -> list[Case]:
         *(Case(name, "scene", name, {name: data, **library}) for name, data in meshes.items()),
         *_people_have("gltf", "mesh", ".glb"),
         *(Case(name, "profile", name, {name: data}) for name, data in profiles.items()),
+        *(
+            case
+            for ending in (".txt", ".prf", ".smd", ".sdf")
+            for case in _people_have("profiles", "profile", ending)
+        ),
         *_btf_cases(),
         drive("png"),
         drive("jpg"),

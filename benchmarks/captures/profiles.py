@@ -193,7 +193,7 @@ TABLES = (
 )  # fmt: skip
 
 EVEN = (
-    _read("single_with_step.txt", "heights alone", _heights("Höhe [µm]\r\n"), step=STEP),
+    _read("single_with_step.dat", "heights alone", _heights("Höhe [µm]\r\n"), step=STEP),
     _read("mitutoyo_pitch.csv", "a step in the header",
           _heights("Sampling pitch,0.5,um\r\nHeight (nm)\r\n", scale=1e3)),
     _read("lateral_resolution.asc", "a step in the header",
