@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import math
+import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -66,20 +67,34 @@ def _from_adobe_rgb(stored: StoredPicture) -> StoredPicture:
     return stored._replace(values=colours, notes=(*stored.notes, note))
 
 
-def _check_frame(file: Path, data: bytes) -> None:
-    """Raise BadInput for what Pillow would only call broken: 12 bits, lossless."""
+class Frame(NamedTuple):
+    """What a frame's header says: its marker, bits a sample, pixels."""
+
+    marker: int
+    bits: int
+    height: int
+    width: int
+
+
+def frame_of(data: bytes) -> Frame | None:
+    """The header of a JPEG's first frame; None where there is none."""
     at = 2
-    while at + 5 < len(data) and data[at] == 0xFF:
+    while at + 9 <= len(data) and data[at] == 0xFF:
         marker = data[at + 1]
         if marker in _FRAMES:
-            bits = data[at + 4]
-            way_out = "a usual JPEG of 8 bits, or a 16-bit TIFF"
-            if bits == 12:
-                raise BadInput(file, "sample type", f"{bits} bit", way_out)
-            if marker not in _READ_FRAMES:
-                raise BadInput(file, "coding", f"lossless or hierarchical (0x{marker:X})", way_out)
-            return
+            return Frame(marker, *struct.unpack_from(">BHH", data, at + 4))
         at += 1 if marker == 0xFF else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return None
+
+
+def _check_frame(file: Path, data: bytes) -> None:
+    """Raise BadInput for what Pillow would only call broken: 12 bits, lossless."""
+    frame = frame_of(data)
+    way_out = "a usual JPEG of 8 bits, or a 16-bit TIFF"
+    if frame and frame.bits == 12:
+        raise BadInput(file, "sample type", "12 bit", way_out)
+    if frame and frame.marker not in _READ_FRAMES:
+        raise BadInput(file, "coding", f"lossless or hierarchical (0x{frame.marker:X})", way_out)
 
 
 def _more_pictures(image: Any) -> list[str]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.code_points import rgb_of_lab
 from storage.readers.decoded_image import Space, StoredPicture, damaged, straight
+from storage.readers.jpeg_files import frame_of
 from storage.readers.picture_sizes import check_area
 from storage.readers.pillow_pictures import as_alpha, load, stored_picture
 
@@ -27,10 +28,16 @@ _COLOURS = {_WHITE_IS_ZERO: 1, 1: 1, 2: 3, _PALETTE: 1, _INKS: 4, _YCBCR: 3, _LA
 """Samples of a pixel's colour by photometric interpretation."""
 _RAW = (32803, 34892)  # photometric: a sensor's colour filters, linear raw
 _DNG_VERSION, _PROFILE, _LAYERS, _ORIENTATION, _COLOUR_MAP = 50706, 34675, 37724, 274, 320
-_JPEG = (6, 7, 33007, 34892)
-_FAX = (2, 3, 4)
+_JPEG = 7
+_BY_PILLOW = (2, 3, 4, 6)  # fax codes, the old JPEG
+_PACKED = {
+    *(1, 5, 8, 32773, 32946),  # none, LZW, Deflate, PackBits
+    *(34925, 34926, 50000),  # LZMA, Zstandard
+}
+"""Compressions that unfold to no more than the page announces."""
 _ASSOCIATED, _UNASSOCIATED = 1, 2
 _REDUCED, _MASK = 1, 4  # bits of the subfile type
+_FRAME_WITHIN = 65536  # bytes of a JPEG, the header of its frame stands there
 _MOST_PAGES = 100  # that are looked at
 _WAY_OUT = "one of 8 or 16 bits, RGB or grey; save it again as such"
 
@@ -46,9 +53,10 @@ def read_tiff(file: Path) -> StoredPicture:
         _check_complete(file, tiff, page)
         _check_size(file, page)
         _check_kind(file, page)
+        _check_compression(file, tiff, page)
         notes = (*_left_out(page), *page_notes)
-        if page.compression in _FAX or (
-            page.photometric == _YCBCR and page.compression not in _JPEG
+        if page.compression in _BY_PILLOW or (
+            page.photometric == _YCBCR and page.compression != _JPEG
         ):
             return _with_pillow(file, notes)
         samples = _samples(file, page)
@@ -128,6 +136,26 @@ def _check_kind(file: Path, page: tifffile.TiffPage) -> None:
     if not is_known or (only_codes and kind not in ("bool", "uint8", "uint16")):
         found = f"{page.bitspersample} bit" if page.dtype is None else f"{kind} ({name})"
         raise BadInput(file, "sample type", found, f"unsigned integers or floats: {_WAY_OUT}")
+
+
+def _check_compression(file: Path, tiff: tifffile.TiffFile, page: tifffile.TiffPage) -> None:
+    """Raise BadInput for compressions that may unfold to anything, whatever the page announces."""
+    name = str(getattr(page.compression, "name", page.compression))
+    if page.compression != _JPEG:
+        if page.compression not in (*_PACKED, *_BY_PILLOW):
+            expected = "none, LZW, Deflate, PackBits, LZMA, Zstandard or JPEG; save it again"
+            raise BadInput(file, "compression", name, expected)
+        return
+    rows, columns = min(page.rowsperstrip, page.imagelength), page.imagewidth
+    if page.is_tiled:
+        rows, columns = page.tilelength, page.tilewidth
+    most = 2 * rows * columns + 65536
+    for begin, count in zip(page.dataoffsets, page.databytecounts, strict=True):
+        tiff.filehandle.seek(begin)
+        start = tiff.filehandle.read(min(count, _FRAME_WITHIN))
+        frame = frame_of(start)
+        if frame is None or frame.width * frame.height > most:
+            raise damaged(file, "TIFF")
 
 
 def _left_out(page: tifffile.TiffPage) -> list[str]:
