@@ -318,7 +318,7 @@ _CASES_OF_TEXT = (
         "inside out",
         obj_vertices(_BALL.vertices) + obj_faces(_BALL.faces[2:, ::-1]),
         "told",
-        ["318 triangles of pieces with small openings turned over"],
+        ["318 triangles of open pieces turned over: they were seen"],
         has_triangles(_BALL.vertices, _BALL.faces[2:]),
         read_for_fur,
     ),

@@ -36,6 +36,9 @@ _NOTHING = 1e-12
 _LINES = 1 << 15
 _SELDOM = 0.05
 _LEAST_LINES = 20
+# The sum of a piece's areas as vectors over its area, which is how much of it is open: above this
+# it is a sheet, of which one side may be hidden on purpose (a floor under houses), and no body.
+_SHEET = 0.95
 
 _EPSILON = float(np.finfo(np.float64).eps)
 _TINY = float(np.finfo(np.float64).tiny)
@@ -75,9 +78,9 @@ def repair_mesh(
       together by such edges is a piece; edges in more than two triangles separate pieces.
     - A closed piece, without borders, faces outwards: it has positive volume. So cavities face
       into the material around them; `solids.make_closed_mesh` knows better. An open piece, and a
-      closed one that is flat, faces where most of its area did, unless that side is hardly ever
-      seen from outside the mesh (a scan with holes that is inside out): it is turned over then. A
-      piece with one side only (a Moebius strip) stays as it is.
+      closed one that is flat, faces where most of its area did, unless it is a body whose front
+      is hardly ever seen from outside the mesh (a scan with holes that is inside out): it is turned
+      over then. A piece with one side only (a Moebius strip) stays as it is.
 
     Triangles keep their order and their first corner; those that are turned over have their second
     and third swapped. A repaired mesh is not changed by another repair.
@@ -254,7 +257,7 @@ def _orient(
         notes.append(f"{things} of closed pieces turned over to face outwards.")
     if outwards := int((turned & inside_out[piece]).sum()):
         things = _count(outwards, "triangle", "triangles")
-        notes.append(f"{things} of pieces with small openings turned over to face outwards.")
+        notes.append(f"{things} of open pieces turned over: they were seen from behind.")
     if agreeing := int((turned & (open_ones & ~inside_out)[piece]).sum()):
         things = _count(agreeing, "triangle", "triangles")
         notes.append(f"{things} of open pieces turned over to face as most of their piece's area.")
@@ -273,15 +276,21 @@ def _orient(
 def _hardly_seen_in_front(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64], piece: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """(pieces,): whether those who look at the mesh from all around see the piece from behind."""
-    seen = seen_from_outside(vertices, triangles, _LINES)
-    a, b, c = (vertices[triangles[seen.triangle, corner]] for corner in range(3))
-    front = np.einsum("ni,ni->n", np.cross(b - a, c - a), seen.direction) < 0
+    """(pieces,): whether a piece is a body seen from behind by who looks at the mesh from afar."""
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    facing = np.cross(b - a, c - a)
     pieces = int(piece.max()) + 1
+    total = np.stack([np.bincount(piece, axis, pieces) for axis in facing.T], axis=1)
+    area = np.bincount(piece, np.linalg.norm(facing, axis=1), pieces)
+    is_body = np.linalg.norm(total, axis=1) <= _SHEET * area
+    if not is_body.any():
+        return is_body
+    seen = seen_from_outside(vertices, triangles, _LINES)
+    front = np.einsum("ni,ni->n", facing[seen.triangle], seen.direction) < 0
     number = piece[seen.triangle]
     met = np.bincount(number, minlength=pieces)
     in_front = np.bincount(number[front], minlength=pieces)
-    hardly: NDArray[np.bool_] = (met >= _LEAST_LINES) & (in_front <= _SELDOM * met)
+    hardly: NDArray[np.bool_] = (met >= _LEAST_LINES) & (in_front <= _SELDOM * met) & is_body
     return hardly
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from benchmarks.captures.case import FILES
 from pipelines.geometry.mended_meshes import MendedMesh, mend_mesh
 from pipelines.geometry.shapes import square
 from pipelines.geometry.texture_coordinates import texture_stretch
+from storage.readers.meshes import read_mesh
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -106,15 +110,17 @@ def test_a_plain_mesh_stays_as_it_is() -> None:
         (lambda uvs: uvs * 40 - 7, None),
     ],
 )
-def test_texture_coordinates_that_are_of_no_use(change: object, said: str | None) -> None:
+def test_texture_coordinates_that_are_of_no_use(
+    change: Callable[[Array], Array], said: str | None
+) -> None:
     flat = square(4)
-    given_uvs = change(flat.uvs)  # type: ignore[operator]
+    given_uvs = change(flat.uvs)
     mesh, notes = mend_mesh(flat.vertices, flat.triangles, given_uvs)
     assert np.isfinite(mesh.uvs).all()
     assert texture_stretch(mesh.vertices, mesh.triangles, mesh.uvs) < 3
     if said is None:
         assert len(notes) == 1
-        np.testing.assert_allclose(mesh.uvs, change(mesh.vertices[:, :2] + 0.5))  # type: ignore[operator]
+        np.testing.assert_allclose(mesh.uvs, change(mesh.vertices[:, :2] + 0.5))
     else:
         assert said in notes[-1]
 
@@ -122,7 +128,7 @@ def test_texture_coordinates_that_are_of_no_use(change: object, said: str | None
 def test_some_triangles_without_texture_are_unwrapped_to_scale() -> None:
     flat = square(4)
     uvs = flat.uvs * 3
-    rows = (flat.vertices[flat.triangles][:, :, 0] > 0).any(axis=1).nonzero()[0][:6]
+    rows = np.flatnonzero((flat.vertices[flat.triangles][:, :, 0] > 0).any(axis=1))[:6]
     apart = np.arange(3 * len(flat.triangles)).reshape(-1, 3)
     uvs = uvs[flat.triangles].reshape(-1, 2)
     uvs[apart[rows].ravel()] = np.nan
@@ -136,3 +142,12 @@ def test_some_triangles_without_texture_are_unwrapped_to_scale() -> None:
 def test_shapes_of_texture_coordinates() -> None:
     with pytest.raises(ValueError, match=r"uvs have the shape \(4, 2\); expected \(25, 2\)"):
         mend_mesh(square(4).vertices, square(4).triangles, np.zeros((4, 2)))
+
+
+def test_a_scan_that_is_inside_out_is_its_twin() -> None:
+    """The egg and the egg inside out, as they were met: what fur grows on is equal to the bit."""
+    twins = [read_mesh(FILES / f"obj_{name}.obj") for name in ("egg_closed", "inside_out_closed")]
+    one, other = (mend_mesh(twin.vertices, twin.triangles, twin.uvs) for twin in twins)
+    assert_same(one, other)
+    assert one.notes == ()
+    assert other.notes == ("960 triangles of closed pieces turned over to face outwards.",)
