@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import io
+import struct
 from pathlib import Path
 
 import numpy as np
 
 from storage.readers.bad_input import BadInput
 from storage.readers.decoded_image import StoredPicture
+from storage.readers.picture_sizes import check_area
 from storage.readers.pillow_pictures import as_alpha, load, stored_picture
+
+_CODESTREAM = b"\xff\x4f\xff\x51"  # how one begins; its header (SIZ) follows
 
 
 def read_jpeg2000(file: Path) -> StoredPicture:
@@ -18,19 +22,16 @@ def read_jpeg2000(file: Path) -> StoredPicture:
     from PIL import Jpeg2KImagePlugin
 
     data = file.read_bytes()
+    at = data.index(_CODESTREAM)
+    # What is decoded is as large as the codestream says, whatever the boxes around it say.
+    right, bottom, left, top = struct.unpack_from(">4I", data, at + 8)
+    check_area(file, right - left, bottom - top, 8)
     image = load(file, Jpeg2KImagePlugin.Jpeg2KImageFile, io.BytesIO(data), 8)
-    depth, is_signed = _depth(data)
+    depth, is_signed = (data[at + 42] & 0x7F) + 1, bool(data[at + 42] & 0x80)
     if is_signed or depth > 16:
         kind = f"{depth} bit{' signed' if is_signed else ''}"
         raise BadInput(file, "sample type", kind, "8 or 16 bits; save it as a 16-bit TIFF")
     return _deep(data, depth, stored_picture(image)) if depth > 8 else stored_picture(image)
-
-
-def _depth(data: bytes) -> tuple[int, bool]:
-    """Bits of a sample and whether it is signed, by the codestream's header (SIZ)."""
-    at = data.find(b"\xff\x4f\xff\x51")
-    code = data[at + 42]
-    return (code & 0x7F) + 1, bool(code & 0x80)
 
 
 def _deep(data: bytes, depth: int, stored: StoredPicture) -> StoredPicture:
