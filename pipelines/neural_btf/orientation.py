@@ -6,8 +6,10 @@ wrong side. But light and relief tell. From brightness as it follows the light, 
 come slopes, and from these the relief: of the eight ways a square can lie only the right one has
 slopes that are those of one surface, with the shadows where photographs are dark (turned by half,
 hills are hollows: shadows would fall where it is bright), and with the parallax of oblique views.
-A way's score is the mean of two correlations over the texels: of the ratio of brightness to a ring
-of lights with that of the relief, and of oblique views with what the relief would show.
+A way's score is the mean of three correlations over the texels: of how dark photographs from above
+are, compared with a ring of lights, and what the relief would make them; of the part of it that is
+the same under opposite lights, where slopes cancel and shadows do not; and of oblique views and
+what the relief would show in them, wherever the plane is to which they are rectified.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from pipelines.neural_btf.relief import (
     STEEPEST_LIGHT,
     Floats,
     heights,
+    moved,
+    parallax,
     relative,
-    seen,
     shaded,
     slopes,
 )
@@ -44,7 +47,7 @@ ORIENTATIONS = (
 )
 """How photographs lie in their files: left and right changed or not, then turned by degrees
 counter-clockwise."""
-CLEAR_MARGIN = 0.05
+CLEAR_MARGIN = 0.03
 """Of the best score over the second: less says nothing."""
 CLEAR_SCORE = 0.25
 """Photographs dealt at random to lights and views seldom reach both."""
@@ -63,6 +66,7 @@ _ABOVE = np.radians(12.0)  # as good as straight above
 _GRAZING = np.radians((40.0, 80.0))
 _OBLIQUE = np.radians((25.0, 62.0))
 _STEEP_LIGHTS = np.radians(35.0)
+_PLANES = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)  # texels: the rectified plane's parallax
 _BRIGHTEST = 0.6  # of a ring's mean: dark is dark, how bright bright is depends on the gloss
 
 
@@ -238,20 +242,52 @@ def _score(looks: Looks, orientation: str) -> float:
 
     above = upright(looks.above)
     grazing = [ring for ring in looks.rings if looks.lights[ring[0], 0] >= _GRAZING[0]]
+    azimuths = [looks.lights[ring, 1] for ring in grazing]
     dark = [_darkness(above[ring]) for ring in grazing]
-    moved = upright(looks.oblique) if len(looks.oblique) else None
+    changes = _changes(upright(looks.oblique)) if len(looks.oblique) else None
     relief = heights(slopes(above, looks.lights, looks.rings))
     scores = []
     for exaggeration in _EXAGGERATIONS:
         guess = exaggeration * relief
         shadows = [_darkness(shaded(guess, looks.lights[ring])) for ring in grazing]
-        score = [_correlation(np.concatenate(dark), np.concatenate(shadows))]
-        if moved is not None:
-            flat = upright(looks.flat)
-            moving = np.stack([seen(guess, flat, view) for view in looks.views])
-            score.append(_correlation(_changes(moved), _changes(moving)))
-        scores.append(float(np.mean(score)))
+        found = [
+            _correlation(np.concatenate(dark), np.concatenate(shadows)),
+            _correlation(_even_part(dark, azimuths), _even_part(shadows, azimuths)),
+        ]
+        if changes is not None:
+            found.append(_seen(guess, upright(looks.flat), looks.views, changes))
+        scores.append(float(np.mean(found)))
     return max(scores)
+
+
+def _seen(relief: Floats, flat: Floats, views: NDArray[np.float64], changes: Floats) -> float:
+    """Correlation of what changes from view to view with what a relief would show, at best."""
+    distances = [parallax(relief, view) for view in views]
+    return max(
+        _correlation(
+            changes,
+            _changes(
+                np.stack(
+                    [
+                        moved(flat, distance + np.float32(plane), float(phi))
+                        for distance, (_, phi) in zip(distances, views, strict=True)
+                    ]
+                )
+            ),
+        )
+        for plane in _PLANES
+    )
+
+
+def _even_part(rings: list[Floats], azimuths: list[NDArray[np.float64]]) -> Floats:
+    """Of rings (light, y, x) the waves (2, y, x) of half a turn, all after each other."""
+    found = []
+    for ring, phi in zip(rings, azimuths, strict=True):
+        waves = [np.ones_like(phi)]
+        waves += [wave(turns * phi) for turns in (1, 2) for wave in (np.cos, np.sin)]
+        inverse = np.linalg.pinv(np.stack(waves, axis=1))[3:].astype(np.float32)
+        found.append(np.einsum("kl,lyx->kyx", inverse, ring))
+    return np.concatenate(found)
 
 
 def _darkness(ring: Floats) -> Floats:

@@ -91,16 +91,30 @@ def _clearance(relief: Floats, theta: float, phi: float) -> Floats:
     return least
 
 
-def seen(relief: Floats, texture: Floats, view: NDArray[np.float64]) -> Floats:
-    """A texture (y, x) on a relief, seen from a view and rectified to the mean plane."""
+def parallax(relief: Floats, view: NDArray[np.float64]) -> Floats:
+    """Where a view sees the surface, (y, x): texels from every texel of the mean plane on its ray,
+    in the direction of the view's phi."""
     theta, phi = view
     high, low = float(relief.max()) * np.tan(theta), float(relief.min()) * np.tan(theta)
-    found, missing = texture.copy(), np.ones(relief.shape, bool)
+    found, missing = np.zeros_like(relief), np.ones(relief.shape, bool)
+    above = np.full_like(relief, -1.0)
     for distance in np.arange(min(np.ceil(high), _FARTHEST), max(low, -_FARTHEST) - _STEP, -_STEP):
-        met = missing & (_beside(relief, distance, phi) * np.tan(theta) >= distance)
-        found[met] = _beside(texture, distance, phi)[met]
+        here = _beside(relief, distance, phi) * np.float32(np.tan(theta)) - np.float32(distance)
+        met = missing & (here >= 0)
+        share = here[met] / np.maximum(here[met] - above[met], 1e-6)
+        found[met] = distance + _STEP * np.minimum(share, 1.0)
         missing &= ~met
+        above = here
     return found
+
+
+def moved(texture: Floats, distance: Floats, phi: float) -> Floats:
+    """What a texture (y, x) has ``distance`` (y, x) from every texel in the direction phi."""
+    from scipy import ndimage
+
+    rows, columns = np.indices(texture.shape, np.float32)
+    places = [rows - distance * np.sin(phi), columns + distance * np.cos(phi)]
+    return np.asarray(ndimage.map_coordinates(texture, places, order=1, mode="nearest"), np.float32)
 
 
 def _beside(values: Floats, distance: float, phi: float) -> Floats:

@@ -126,6 +126,9 @@ def test_what_stands_out_moves_towards_the_viewer_s_far_side() -> None:
     height[8:13, 8:13] = 4.0
     texture[10, 10] = 1.0
     view = np.array([np.radians(45.0), 0.0])  # the viewer is on the right
-    rows, columns = np.nonzero(relief.seen(height, texture, view) > 0.5)
-    assert rows.tolist() == [10]
-    assert columns[0] in (6, 7)  # rays go on by three quarters of a texel
+    distance = relief.parallax(height, view)
+    assert distance[10, 6] == pytest.approx(4.0, abs=1e-3)
+    assert distance[10, 2] == 0
+    picture = relief.moved(texture, distance, 0.0)
+    assert picture[10, 6] == pytest.approx(1.0, abs=1e-3)
+    assert picture[:, 7:].max() == 0
