@@ -55,6 +55,7 @@ def valid_cases() -> list[Case]:
         *(Case(name, "mesh", name, {name: data}) for name, data in meshes.items()),
         *(Case(name, "scene", name, {name: data, **library}) for name, data in meshes.items()),
         *_people_have("gltf", "mesh", ".glb"),
+        *_people_have("meshes", "mesh"),
         *(Case(name, "profile", name, {name: data}) for name, data in profiles.items()),
         *(
             case
