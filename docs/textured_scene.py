@@ -24,7 +24,11 @@ FloatArray = NDArray[np.float64]
 
 _SIDE = 1024  # texels
 _SHOWN = Path(__file__).parent / "pictures" / "ssdf-textures.jpg"
-_SETTINGS = ("--set", "edge=0.03", "--set", "width=720", "--set", "frames=2")
+_SETTINGS = [
+    text
+    for given in ("edge=0.04", "width=720", "frames=1", "reference_samples=2")
+    for text in ("--set", given)
+]
 _LIBRARY = """newmtl planks
 Kd 1 1 1
 Ks 0.04 0.04 0.04
@@ -64,8 +68,8 @@ def write_textured_scene(path: Path) -> None:
     ball = shapes.sphere(48)
     flat = shapes.square(1)
     parts = (
-        ("planks", flat.vertices * [5, 5, 0], flat.triangles, flat.uvs * 2.5),
-        ("bricks", _upright(flat.vertices), flat.triangles, flat.uvs * [2.5, 0.8]),
+        ("planks", flat.vertices * [3.2, 3.2, 0], flat.triangles, flat.uvs * 1.8),
+        ("bricks", _upright(flat.vertices), flat.triangles, flat.uvs * [1.6, 0.6]),
         ("tiles", ball.vertices * 0.5 + [-0.45, -0.1, 0.5], ball.triangles, _around(ball.uvs)),
         ("gold", ball.vertices * 0.36 + [0.6, -0.55, 0.36], ball.triangles, _around(ball.uvs)),
     )
@@ -87,8 +91,8 @@ def _lines(
 
 
 def _upright(square: FloatArray) -> FloatArray:
-    """A wall behind: 5 wide, 1.6 high, facing -y."""
-    return np.stack([square[:, 0] * 5, np.full(len(square), 1.1), (square[:, 1] + 0.5) * 1.6], 1)
+    """A wall behind: 3.2 wide, 1.2 high, facing -y."""
+    return np.stack([square[:, 0] * 3.2, np.full(len(square), 0.8), (square[:, 1] + 0.5) * 1.2], 1)
 
 
 def _around(uvs: FloatArray) -> FloatArray:
