@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.geometry.meshes import Mesh, check_mesh, vertex_normals
+from pipelines.geometry.meshes import Mesh, check_mesh, make_mesh
 from pipelines.geometry.repair import RepairedMesh, repair_mesh
 from pipelines.geometry.texture_coordinates import texture_stretch, unwrap
 
@@ -55,8 +55,7 @@ def mend_mesh(
     rows = np.column_stack([mended.triangles.ravel(), corner_uvs.reshape(-1, 2) + 0.0])
     _, first, corner = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     split = mended.vertices[mended.triangles.ravel()[first]]
-    faces = corner.reshape(-1, 3).astype(np.int32)
-    mesh = Mesh(split, faces, corner_uvs.reshape(-1, 2)[first], vertex_normals(split, faces))
+    mesh = make_mesh(split, corner.reshape(-1, 3), corner_uvs.reshape(-1, 2)[first])
     return MendedMesh(mesh, tuple(notes))
 
 

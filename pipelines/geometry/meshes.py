@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipelines.geometry.texture_coordinates import unwrap
-
 FAR = 10.0
 """Radii of a mesh; as far away single precision has its vertices to a millionth of that."""
 
@@ -35,20 +33,14 @@ class Mesh:
     normals: NDArray[np.float64]
 
 
-def make_mesh(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike | None = None) -> Mesh:
-    """A mesh with normals and, where ``uvs`` is None, with texture coordinates.
-
-    ``vertices`` (V, 3), ``triangles`` (F, 3) integers, ``uvs`` (V, 2) as described above, or None:
-    then `unwrap` makes them. Raises ValueError for other shapes, for references to vertices
-    that do not exist and for numbers that are not finite.
+def make_mesh(vertices: ArrayLike, triangles: ArrayLike, uvs: ArrayLike) -> Mesh:
+    """A mesh with normals: ``vertices`` (V, 3), ``triangles`` (F, 3) integers, ``uvs`` (V, 2) as
+    described above. Raises ValueError for other shapes, for references to vertices that do not
+    exist and for numbers that are not finite.
     """
-    points = np.array(vertices, np.float64)
+    points, coordinates = np.array(vertices, np.float64), np.array(uvs, np.float64)
     faces = np.array(triangles)
     check_mesh(points, faces)
-    if uvs is None:
-        points, faces, coordinates = unwrap(points, faces)
-    else:
-        coordinates = np.array(uvs, np.float64)
     if coordinates.shape != (len(points), 2) or not np.isfinite(coordinates).all():
         raise ValueError(
             f"uvs have the shape {coordinates.shape}; expected ({len(points)}, 2) finite numbers"
