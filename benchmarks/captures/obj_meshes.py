@@ -323,6 +323,15 @@ _CASES_OF_TEXT = (
         read_for_fur,
     ),
     _case(
+        "scan_for_glass",
+        "small holes",
+        obj_vertices(_BALL.vertices) + obj_faces(_BALL.faces[1:]),
+        "told",
+        ["1 hole closed by lids"],
+        encloses(_BALL.volume),
+        read_for_glass,
+    ),
+    _case(
         "some_turned",
         "faces that disagree",
         _V + obj_faces([side[::-1] if n % 3 == 1 else side for n, side in enumerate(SIDES)]),

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipelines.geometry.lids import lids_over_holes
 from pipelines.geometry.mesh_edges import consistent_orientation, flip_triangles, mesh_edges
 from pipelines.geometry.meshes import angle_weighted_normals
 from pipelines.geometry.repair import clean_mesh
@@ -52,7 +53,8 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
 
     vertices (V, 3), triangles (F, 3) integers: merged and cleaned as by `repair.repair_mesh`, but
     that triangles without area stay where the surface is not closed without them. The others keep
-    their order; those that have to be turned over have their second and third corner swapped.
+    their order; those that have to be turned over have their second and third corner swapped. Small
+    holes get lids (see `lids.lids_over_holes`), after all other triangles.
 
     Of surfaces inside one another the outermost faces outwards, the next one into the cavity that
     it bounds, and so on by turns, however they faced. It is not checked that no surface crosses
@@ -72,7 +74,14 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
     if not _is_closed(mesh.triangles):
         with_flat = clean_mesh(vertices, triangles, flat=True)
         mesh = with_flat if _is_closed(with_flat.triangles) else mesh
-    points, faces = mesh.vertices, mesh.triangles.astype(np.int64)
+    points, faces, notes = mesh.vertices, mesh.triangles.astype(np.int64), list(mesh.notes)
+    lids = None if _is_closed(faces) else lids_over_holes(points, faces)
+    if lids is not None:
+        points = np.concatenate([points, lids.vertices])
+        faces = np.concatenate([faces, lids.triangles])
+        holes = f"{len(lids.vertices)} hole{'s' if len(lids.vertices) > 1 else ''}"
+        notes.append(f"{holes} closed by lids, at most {lids.share:.2g} of a surface.")
+    given = faces.copy()
     surface = _oriented(faces)
     parts = _signed_volumes(points, faces)
     volume = np.bincount(surface, parts)
@@ -85,8 +94,7 @@ def make_closed_mesh(vertices: ArrayLike, triangles: ArrayLike) -> ClosedMesh:
         )
     is_cavity = _depths(points, faces, surface) % 2 == 1
     flip_triangles(faces, ((volume < 0) != is_cavity)[surface])
-    turned = int((faces != mesh.triangles).any(axis=1).sum())
-    notes = list(mesh.notes)
+    turned = int((faces != given).any(axis=1).sum())
     if turned:
         things = f"{turned} triangle{'s' if turned > 1 else ''}"
         notes.append(f"{things} turned over to face out of the material.")
@@ -111,7 +119,7 @@ def smooth_solid(mesh: ClosedMesh, crease: float = 35.0) -> Solid:
     return Solid(mesh.vertices, mesh.triangles, normals.astype(np.float32))
 
 
-def _is_closed(triangles: NDArray[np.int32]) -> bool:
+def _is_closed(triangles: NDArray[np.integer]) -> bool:
     return bool((mesh_edges(triangles.astype(np.int64)).uses == 2).all())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -134,6 +135,36 @@ def test_a_triangle_without_area_stays_where_it_closes_a_slit() -> None:
     mesh = make_closed_mesh(np.concatenate([CUBE, [middle]]), triangles)
     assert len(mesh.triangles) == 14
     assert volume(*mesh[:2]) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_small_holes_get_lids(turned: bool) -> None:
+    """Two of a ball's triangles are missing, at its poles: flat lids are these triangles."""
+    ball = trimesh.creation.icosphere(2)
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces)
+    height = vertices[faces][:, :, 2].mean(axis=1)
+    rest = np.delete(faces, [height.argmin(), height.argmax()], axis=0)
+    mesh = make_closed_mesh(vertices, rest[:, ::-1] if turned else rest)
+    assert volume(*mesh[:2]) == pytest.approx(ball.volume)
+    assert len(mesh.triangles) == len(rest) + 6
+    assert re.fullmatch(r"2 holes closed by lids, at most 0\.00\d+ of a surface\.", mesh.notes[0])
+
+
+def test_large_holes_and_holes_that_touch_are_refused() -> None:
+    ball = trimesh.creation.icosphere(2)
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces)
+    height = vertices[faces][:, :, 2].mean(axis=1)
+    with pytest.raises(ValueError, match="open along"):
+        make_closed_mesh(vertices, faces[height > -0.8])
+    corner = faces[0, 0]
+    opposite = np.flatnonzero((faces == corner).any(axis=1))[[0, 3]]
+    with pytest.raises(ValueError, match="open along 6 border edges"):
+        make_closed_mesh(vertices, np.delete(faces, opposite, axis=0))
+    # A small cup beside a large body is not filled.
+    cup = vertices[faces[height > 0]].reshape(-1, 3) / 50 + [5, 0, 0]
+    rows = np.arange(len(cup)).reshape(-1, 3) + len(vertices)
+    with pytest.raises(ValueError, match="open along"):
+        make_closed_mesh(np.concatenate([vertices, cup]), np.concatenate([faces, rows]))
 
 
 def test_what_was_turned_over_is_told() -> None:
