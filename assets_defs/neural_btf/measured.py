@@ -33,15 +33,15 @@ def measured_photographs(
     "auto". Raises BadInput as `open_btf`.
     """
     from pipelines.light.directions import Pairs
-    from pipelines.neural_btf.orientation import ORIENTATIONS, turned_upright
+    from pipelines.neural_btf.orientation import ORIENTATIONS, central_patch, turned_upright
 
     measured = open_btf(path, crop, exr_colours)
     notes = measured.notes
     if orientation == "auto":
         # Of whole photographs, whatever a crop leaves of them.
-        orientation, said = _orientation(
-            measured if crop is None else open_btf(path, None, exr_colours)
-        )
+        whole = measured if crop is None else open_btf(path, None, exr_colours)
+        patch = central_patch(whole.height, whole.width)
+        orientation, said = _orientation(open_btf(path, patch, exr_colours))
         notes = (*notes, *said)
     about = {"layout": measured.layout, "colour": measured.colour, "orientation": orientation}
     if measured.shifted_lights:
@@ -72,19 +72,11 @@ def _orientation(measured: MeasuredBTF) -> tuple[str, tuple[str, ...]]:
 
 
 def _scores(measured: MeasuredBTF) -> Scores | None:
-    import numpy as np
-
     from pipelines.light.directions import Pairs
-    from pipelines.neural_btf.orientation import central_patch, orientation_scores
-
-    left, top, width, height = central_patch(measured.height, measured.width)
+    from pipelines.neural_btf.orientation import orientation_scores
 
     def read(images: NDArray[np.intp]) -> NDArray[np.float32]:
-        return np.concatenate(
-            [
-                measured.read(image, image + 1)[:, top : top + height, left : left + width]
-                for image in images.tolist()
-            ]
-        )
+        first = int(images.min())  # factors are multiplied out by blocks, not one by one
+        return measured.read(first, int(images.max()) + 1)[images - first]
 
     return orientation_scores(Pairs(measured.light, measured.view), read)
