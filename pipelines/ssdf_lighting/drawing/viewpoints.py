@@ -17,6 +17,7 @@ AZIMUTH, ELEVATION = -62.0, 24.0
 
 _LOOKED_AT = (48, 36)  # pixels
 _FEW = 0.04
+_GAP = 0.2
 _TURNS = tuple(15.0 * side * step for step in range(13) for side in (1, -1))
 _ELEVATIONS = (ELEVATION, 8.0, 55.0)
 
@@ -40,6 +41,9 @@ def scene_camera(scene: Scene, azimuth: float, elevation: float, aspect: float) 
     raised = scene.vertices[scene.vertices[:, 2] > scene.vertices[:, 2].min() + 0.05 * height]
     shown = raised if len(raised) else scene.vertices
     low, high = shown.min(axis=0), shown.max(axis=0)
+    bottom = scene.vertices[:, 2].min()
+    if low[2] > bottom + _GAP * height:  # long edges: walls have no vertices near the floor
+        low[2] = bottom
     x, y, z = (low + high) / 2.0
     target = (float(x), float(y), float(z))
     box = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), -1).reshape(-1, 3)
