@@ -16,6 +16,7 @@ method:
    errors against all photographs (``restoration_errors``).
 5. ``panel``: a folded panel of the material under a moving light (``draw_frames``).
 
+``orientation`` tells which way up photographs lie in their files, by the ``relief`` that they show.
 ``compression`` does steps 1 to 4 on photographs in memory by one call (``compress_photographs``).
 ``pictures`` shows each step; ``figures`` tells whether results are right.
 """
