@@ -24,11 +24,7 @@ FloatArray = NDArray[np.float64]
 
 _SIDE = 1024  # texels
 _SHOWN = Path(__file__).parent / "pictures" / "ssdf-textures.jpg"
-_SETTINGS = [
-    text
-    for given in ("edge=0.04", "width=720", "frames=1", "reference_samples=2")
-    for text in ("--set", given)
-]
+_SETTINGS = [text for given in ("edge=0.04", "width=720", "frames=1") for text in ("--set", given)]
 _LIBRARY = """newmtl planks
 Kd 1 1 1
 Ks 0.04 0.04 0.04
