@@ -35,7 +35,7 @@ def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
         try:
             make_closed_mesh(vertices, triangles)
         except ValueError as error:
-            raise ValueError(f"{source.name}: {error}") from error
+            raise ValueError(f"{source.name}: {error}.") from error
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:

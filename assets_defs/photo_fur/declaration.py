@@ -33,7 +33,7 @@ def _check_mesh(source: Source, settings: Mapping[str, Any]) -> None:
         try:
             repair_mesh(vertices, triangles)
         except ValueError as error:
-            raise ValueError(f"{source.name}: {error}") from error
+            raise ValueError(f"{source.name}: {error}.") from error
 
 
 FUR = System(
