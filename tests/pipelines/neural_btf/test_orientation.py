@@ -41,6 +41,7 @@ def cloth() -> Photographed:
     return photographed("corduroy", texels=32)
 
 
+@pytest.mark.slow  # a cloth is photographed
 def test_every_orientation_of_a_cloth_is_found(cloth: Photographed) -> None:
     for orientation in ORIENTATIONS:
         scores = scores_of(cloth, orientation)
@@ -48,6 +49,7 @@ def test_every_orientation_of_a_cloth_is_found(cloth: Photographed) -> None:
         assert scores.are_clear
 
 
+@pytest.mark.slow
 def test_photographs_of_other_lights_say_nothing(cloth: Photographed) -> None:
     for seed in range(3):
         dealt = np.random.default_rng(seed).permutation(len(cloth.photographs))
@@ -81,6 +83,7 @@ def test_too_little_to_see(pairs: Pairs, size: int) -> None:
     assert orientation_scores(pairs, lambda images: np.stack([grey] * len(images))) is None
 
 
+@pytest.mark.slow
 def test_without_oblique_views_the_lights_decide(cloth: Photographed) -> None:
     above = np.flatnonzero(cloth.pairs.view[:, 0] == 0)
     pairs = Pairs(cloth.pairs.light[above], cloth.pairs.view[above])
