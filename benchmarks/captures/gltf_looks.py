@@ -65,6 +65,15 @@ CASES = (
         ("it emits light, which is not used",),
     ),
     gltf_case(
+        "glb_clear_coat_required.glb",
+        "material extensions",
+        textured() | extension("KHR_materials_clearcoat", clearcoatFactor=1.0),
+        shows(),
+        "refused",
+        ("KHR_materials_clearcoat", "with that extension optional"),
+        required=("KHR_materials_clearcoat",),
+    ),
+    gltf_case(
         "glb_clear_coat.glb",
         "material extensions",
         textured() | extension("KHR_materials_clearcoat", clearcoatFactor=1.0),

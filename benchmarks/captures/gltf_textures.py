@@ -53,6 +53,7 @@ def gltf_case(
     uvs: Any = _FROM_TOP,
     second: Any = None,
     colours: Any = None,
+    required: tuple[str, ...] = (),
 ) -> Case:
     """A square with one material. image, other: pictures 0 and 1; uvs, second: its texture
     coordinates; ``texture``: texture 0, if it is not the first image."""
@@ -70,6 +71,8 @@ def gltf_case(
             if data is not None:
                 made.add("images", bufferView=made.view(data), mimeType="image/png")
                 made.add("textures", source=number)
+        if required:
+            made.document["extensionsRequired"] = list(required)
         if sampler is not None:
             made.document["textures"][0]["sampler"] = made.add("samplers", **sampler)
         if texture is not None:
@@ -160,6 +163,17 @@ CASES = (
         ("KTX 2, which is not read: convert it to PNG",),
         image=b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80),
         texture=extension("KHR_texture_basisu", source=0),
+    ),
+    gltf_case(
+        "glb_basis_required.glb",
+        "format of a glTF's texture",
+        textured(),
+        shows(),
+        "refused",
+        ("KHR_texture_basisu", "PNG, JPEG or WebP"),
+        image=b"\xabKTX 20\xbb\r\n\x1a\n" + bytes(80),
+        texture=extension("KHR_texture_basisu", source=0),
+        required=("KHR_texture_basisu",),
     ),
     gltf_case(
         "glb_broken_texture.glb",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,25 @@ _EMISSION = "KHR_materials_emissive_strength"
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
 _UNLIT = "KHR_materials_unlit"
 _READ = {_EMISSION, _GLOSSY, _UNLIT, "KHR_materials_ior", "KHR_materials_specular"}
+_READ_OR_SAID = _READ | {
+    "EXT_texture_avif", "EXT_texture_webp", "KHR_materials_variants", "KHR_texture_transform",
+}  # fmt: skip
+
+
+def _check_required(file: Path, document: dict[str, Any]) -> None:
+    """Raise BadInput for a way to look that the file says it must not be shown without."""
+    required = document.get("extensionsRequired")
+    for name in required if isinstance(required, list) else ():
+        if re.match(r"[A-Z]+[0-9]*_(material|texture)", name) and name not in _READ_OR_SAID:
+            plain = "PNG, JPEG or WebP textures (gltf-transform, gltfpack write them)"
+            other = "a file that can be shown without: export it with that extension optional"
+            expected = plain if "_texture" in name else other
+            raise BadInput(file, "required extension", name, expected)
 
 
 class GltfMaterials:
-    """The materials of a glTF's JSON; ``image`` gives the bytes of one of its images.
+    """The materials of a glTF's JSON; ``image`` gives the bytes of one of its images. Raises
+    BadInput where it requires an extension of materials that is not read.
 
     notes: what of them is held within its range, or not used.
     """
@@ -31,6 +47,7 @@ class GltfMaterials:
         self.notes: list[str] = []
         self._file = file
         self._textures = Textures(file, document, image)
+        _check_required(file, document)
         entries = document.get("materials")
         self._entries = entries if isinstance(entries, list) else []
 
