@@ -28,6 +28,12 @@ stay with the version, the web UI shows them with the asset, the command line pr
 has no safe reading is *refused* before any work, in one sentence that names the file, the field,
 what was found, what is expected and so the way out. Nothing is dropped in silence.
 
+![Five files before and after](pictures/inputs.png)
+
+Above as they were read before, below as they are read now: colours of vertices; three instances by
+`EXT_mesh_gpu_instancing`; a skin in its rest pose; specular-glossiness (a black metal before,
+rejected by a check); a closed mesh that is inside out, in fur.
+
 Below is each case that is tested: files as they were met and files written as other programs
 write them, with what became of each and the words in which it is said. `read` is without a note."""
 
