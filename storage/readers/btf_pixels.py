@@ -22,6 +22,7 @@ from storage.readers.btf_measured import Crop
 from storage.readers.colour_profiles import without_profile
 from storage.readers.colour_spaces import ColourSpace
 from storage.readers.radiance_files import radiance_pixels
+from storage.readers.srgb_curve import light_of_srgb
 
 
 def colour_of(header: Header, space: ColourSpace) -> str:
@@ -122,9 +123,7 @@ def _opaque(file: Path, codes: NDArray[Any], crop: Crop) -> NDArray[Any]:
 def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
     """Linear light of all codes (IEC 61966-2-1, 5.2)."""
     most = int(np.iinfo(dtype).max)
-    encoded = np.arange(most + 1) / most
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    return linear.astype(np.float32)
+    return light_of_srgb(np.arange(most + 1) / most).astype(np.float32)
 
 
 def _profile(file: Path, data: bytes, header: Header) -> bytes | None:

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from storage.readers.colour_spaces import SRGB, space_of, srgb_of_xyz
+from storage.readers.srgb_curve import light_of_srgb
+
 Primaries = tuple[float, float, float, float, float, float, float, float]
 """Chromaticities x, y of red, green, blue and white."""
 
-SRGB: Primaries = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _PRIMARIES: dict[int, Primaries] = {
     1: SRGB,
     2: SRGB,  # not said
@@ -31,9 +33,6 @@ _SRGB_LIKE = (1, 2, 6, 13, 14, 15)
 _WHITE = 203.0
 """Candela per square metre of diffuse white in HDR (ITU-R BT.2408): 1 here."""
 _ROWS = 64  # that are converted at a time
-_BRADFORD = np.array(
-    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
-)
 
 _D50 = (0.9642, 1.0, 0.8249)
 """X, Y and Z of the white of L*a*b* in files and of profiles."""
@@ -79,20 +78,9 @@ def light_of_code_points(codes: NDArray[np.unsignedinteger], points: CodePoints)
 def in_srgb(light: NDArray[np.floating], primaries: Primaries) -> NDArray[np.float32]:
     """Linear RGB (y, x, 1 or 3) of other primaries in those of sRGB, 0 and more; another white
     becomes that of sRGB (Bradford). Raises ValueError for primaries that span no colours."""
-    if light.shape[2] == 1 or np.allclose(primaries, SRGB, atol=2e-3):
+    if light.shape[2] == 1:
         return light.astype(np.float32)
-    matrix = np.linalg.solve(_to_white(SRGB), _to_white(primaries))
-    if not np.isfinite(matrix).all():
-        raise ValueError("primaries that span no colours")
-    return np.maximum(light @ matrix.T, 0).astype(np.float32)
-
-
-def _to_white(primaries: Primaries) -> NDArray[np.float64]:
-    """RGB to cone responses as a share of the white's."""
-    xy = np.reshape(np.array(primaries, np.float64), (4, 2))
-    xyz = np.column_stack([xy[:, 0] / xy[:, 1], np.ones(4), (1 - xy.sum(axis=1)) / xy[:, 1]]).T
-    to_xyz = xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
-    return (_BRADFORD @ to_xyz) / (_BRADFORD @ xyz[:, 3])[:, None]
+    return np.maximum(space_of(primaries).converted(light).astype(np.float32), 0)
 
 
 def rgb_of_lab(lab: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -100,21 +88,9 @@ def rgb_of_lab(lab: NDArray[np.floating]) -> NDArray[np.float32]:
     D50, whose white becomes that of sRGB (Bradford)."""
     fy = (lab[..., 0] + 16) / 116
     f = np.stack([fy + lab[..., 1] / 500, fy, fy - lab[..., 2] / 200], axis=-1)
-    to_white = np.where(f > 6 / 29, f**3, (f - 4 / 29) * 3 * (6 / 29) ** 2)
-    cones = _BRADFORD * np.array(_D50) / (_BRADFORD @ _D50)[:, None]
-    matrix = np.linalg.solve(_to_white(SRGB), cones)
-    return np.clip(to_white @ matrix.T, 0, 1).astype(np.float32)
-
-
-def light_of_srgb(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Linear light in [0, 1] of sRGB values in [0, 1] (IEC 61966-2-1, 5.2)."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-
-
-def srgb_of_light(light: NDArray[np.floating]) -> NDArray[np.float64]:
-    """sRGB values in [0, 1] of linear light; what is less or more is clipped (IEC 61966-2-1)."""
-    clipped = np.clip(light.astype(np.float64), 0, 1)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+    share = np.where(f > 6 / 29, f**3, (f - 4 / 29) * 3 * (6 / 29) ** 2)
+    x, y, _ = np.array(_D50) / sum(_D50)
+    return np.clip(share * _D50 @ srgb_of_xyz((x, y)).T, 0, 1).astype(np.float32)
 
 
 def _pq(encoded: NDArray[np.float64]) -> NDArray[np.float64]:

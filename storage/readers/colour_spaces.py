@@ -108,6 +108,15 @@ def luminance_weights(chromaticities: Sequence[float] = SRGB) -> NDArray[np.floa
     return _to_xyz(np.array(chromaticities, np.float64))[1]
 
 
+def srgb_of_xyz(white: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3) to linear sRGB of CIE XYZ relative to a white (x, y), which becomes that of sRGB.
+
+    Raises ValueError for a white that no eye adapts to.
+    """
+    adapted = _adaptation(np.array(white), np.array(_D65))
+    return np.asarray(np.linalg.inv(_to_xyz(np.array(SRGB))) @ adapted, np.float64)
+
+
 def _words(name: str) -> str:
     return " ".join(re.findall(r"[a-z0-9]+", name.lower()))
 
@@ -115,11 +124,9 @@ def _words(name: str) -> str:
 def _space(name: str, given: NDArray[np.float64]) -> ColourSpace:
     if name == "sRGB":
         return LINEAR_SRGB
-    to_srgb = np.asarray(np.linalg.inv(_to_xyz(np.array(SRGB))), np.float64)
     if name == "CIE XYZ":
-        return ColourSpace(name, to_srgb)
-    adapted = _adaptation(given[6:], np.array(_D65)) @ _to_xyz(given)
-    return ColourSpace(name, np.asarray(to_srgb @ adapted, np.float64))
+        return ColourSpace(name, srgb_of_xyz(_D65))
+    return ColourSpace(name, srgb_of_xyz(given[6:]) @ _to_xyz(given))
 
 
 def _to_xyz(chromaticities: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.image_decoding import decode_image
+from storage.readers.srgb_curve import srgb_of_light
 
 _NAMES = (
     "astronaut",
@@ -33,13 +35,20 @@ def street_photographs() -> dict[str, NDArray[np.uint8]]:
     """
     folder = files("skimage") / "data"
     photographs = {}
-    for name in _NAMES:
-        with as_file(folder / f"{name}.png") as file:
-            colours = decode_image(file).colours
-        photographs[name] = np.repeat(colours, 3, axis=2) if colours.shape[2] == 1 else colours
-    with as_file(folder / "rocket.jpg") as file:
-        photographs["rocket"] = decode_image(file).colours
+    for file_name in (*(f"{name}.png" for name in _NAMES), "rocket.jpg"):
+        with as_file(folder / file_name) as file:
+            codes = _codes(file)
+        three = np.repeat(codes, 3, axis=2) if codes.shape[2] == 1 else codes
+        photographs[file.stem] = three
     return photographs
+
+
+def _codes(file: Path) -> NDArray[np.uint8]:
+    """(height, width, 1 or 3) uint8 codes of sRGB, whatever profile or gamma the file has."""
+    colours = decode_image(file).colours
+    if colours.dtype == np.uint8:
+        return colours
+    return np.rint(255 * srgb_of_light(colours)).astype(np.uint8)
 
 
 class StereoPair(NamedTuple):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from storage.readers.srgb_curve import light_of_srgb
+
 
 def linear_colours(coded: NDArray[np.float64], full: float) -> NDArray[np.float64] | None:
     """Colours of PLY and OBJ files (N, 3 or 4), red, green, blue and perhaps opacity, to linear
@@ -17,8 +19,6 @@ def linear_colours(coded: NDArray[np.float64], full: float) -> NDArray[np.float6
     if not ((coded >= 0) & (coded <= full)).all():
         return None
     shares = coded / full
-    linear = np.where(
-        shares <= 0.04045, shares / 12.92, ((np.maximum(shares, 0.04045) + 0.055) / 1.055) ** 2.4
-    )
+    linear = light_of_srgb(shares)
     opacity = shares[:, 3] if coded.shape[1] == 4 else np.ones(len(coded))
     return np.column_stack([linear[:, :3], opacity])

@@ -17,7 +17,7 @@ GROUPS = [group for group, cases in CASES.items() for _ in cases]
 
 
 @pytest.mark.parametrize(
-    ("group", "case"), zip(GROUPS, ALL, strict=True), ids=[case.file for case in ALL]
+    ("group", "case"), list(zip(GROUPS, ALL, strict=True)), ids=[case.file for case in ALL]
 )
 def test_a_file_ends_as_it_is_right(group: str, case: Case, tmp_path: Path) -> None:
     path = write_file(case, tmp_path)

@@ -230,7 +230,7 @@ def test_a_failing_check_is_exit_code_1(
 ) -> None:
     from pipelines.photo_fur import photograph
 
-    monkeypatch.setattr(photograph, "expose", lambda radiance: radiance * 0.02 + 0.5)
+    monkeypatch.setattr(photograph, "expose", lambda radiance, opaque: radiance * 0.02 + 0.5)
     result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square", "--force")
     assert result.exit_code == 1
     assert "contrast" in result.stderr

@@ -18,12 +18,13 @@ from storage.readers.materials.material import (
     Varying,
 )
 from storage.readers.materials.pictures import Pictures, side_for
+from storage.readers.srgb_curve import light_of_srgb
 
 _MAPPINGS = 2
 _FARTHEST = 1e6  # textures: single precision knows no place of a texel farther out
 _DIGITS = 12  # a slope of 0.3 stays 0.3, though its root was taken
 _CODES = np.arange(256) / 255
-_LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4)
+_LINEAR = light_of_srgb(_CODES)
 
 
 class Finished(NamedTuple):

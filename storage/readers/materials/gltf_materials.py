@@ -15,6 +15,7 @@ from storage.readers.materials.description import Description, Map, Share
 from storage.readers.materials.gltf_textures import Textures
 from storage.readers.materials.gltf_values import Values
 from storage.readers.materials.material import DIELECTRIC, Colour
+from storage.readers.srgb_curve import light_of_srgb
 
 _EMISSION = "KHR_materials_emissive_strength"
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
@@ -170,9 +171,7 @@ def _alpha(codes: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def _linear_mean(codes: NDArray[np.floating]) -> NDArray[np.floating]:
-    colours = codes[..., :3]
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    mean: NDArray[np.floating] = linear.mean(axis=-1)
+    mean: NDArray[np.floating] = light_of_srgb(codes[..., :3]).mean(axis=-1)
     return mean
 
 

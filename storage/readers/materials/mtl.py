@@ -16,6 +16,7 @@ from storage.readers.materials.description import Channel, Description, Map, Sha
 from storage.readers.materials.material import DIELECTRIC, Colour
 from storage.readers.materials.mtl_maps import read_map
 from storage.readers.opening import number, whole_file
+from storage.readers.srgb_curve import light_of_srgb
 
 _LARGEST_LIBRARY = 16 << 20  # bytes
 _BYTE_CODES = 2.0
@@ -247,9 +248,7 @@ def _grey_of(codes: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def _linear_mean(codes: NDArray[np.floating]) -> NDArray[np.floating]:
-    colours = codes[..., :3]
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
-    mean: NDArray[Any] = linear.mean(axis=-1)
+    mean: NDArray[Any] = light_of_srgb(codes[..., :3]).mean(axis=-1)
     return mean
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.materials.description import Map
+from storage.readers.srgb_curve import light_of_srgb, srgb_of_light
 
 MOST_TEXELS = 32 << 20
 """Of all textures of a scene."""
@@ -129,19 +130,10 @@ def _smaller(codes: NDArray[np.uint8], side: int, srgb: bool) -> NDArray[np.uint
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
     light = np.empty(codes.shape, np.float32)
     plain = np.arange(256, dtype=np.float32) / 255
-    light[..., :3] = (_linear(plain) if srgb else plain)[codes[..., :3]]
+    light[..., :3] = (light_of_srgb(plain) if srgb else plain)[codes[..., :3]]
     light[..., 3] = plain[codes[..., 3]]
     averaged: NDArray[Any] = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
     averaged = averaged.reshape(size[1], size[0], 4)
     if srgb:
-        averaged[..., :3] = _coded(averaged[..., :3])
+        averaged[..., :3] = srgb_of_light(averaged[..., :3])
     return np.rint(averaged.clip(0, 1) * 255).astype(np.uint8)
-
-
-def _linear(codes: NDArray[Any]) -> NDArray[Any]:
-    return np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
-
-
-def _coded(light: NDArray[Any]) -> NDArray[Any]:
-    curve = 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(light <= 0.0031308, 12.92 * light, curve)
