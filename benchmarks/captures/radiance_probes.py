@@ -35,7 +35,7 @@ class _Photograph(NamedTuple):
 
 def _read_photograph(path: Path) -> _Photograph:
     """As BTFs read a Radiance picture, of whatever size."""
-    from storage.readers.radiance_files import radiance_header, radiance_pixels
+    from storage.readers.pictures.radiance_files import radiance_header, radiance_pixels
 
     data = path.read_bytes()
     return _Photograph(radiance_pixels(path, data), radiance_header(path, data).notes)

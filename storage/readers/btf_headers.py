@@ -16,8 +16,8 @@ from storage.readers.bad_input import BadInput
 from storage.readers.btf_archives import Members
 from storage.readers.btf_measured import check_area
 from storage.readers.opening import check_memory
-from storage.readers.picture_sizes import MEMORY_PER_BYTE
-from storage.readers.radiance_files import SIGNATURE, radiance_header
+from storage.readers.pictures.picture_sizes import MEMORY_PER_BYTE
+from storage.readers.pictures.radiance_files import SIGNATURE, radiance_header
 
 _PNG_CHANNELS = {0: "grey", 2: "RGB", 3: "palette", 4: "grey with alpha", 6: "RGB with alpha"}
 _JPEG_CHANNELS = {1: "grey", 3: "RGB", 4: "CMYK"}

@@ -15,7 +15,7 @@ from storage.readers.btf_headers import Header, common_header
 from storage.readers.btf_measured import Crop, MeasuredBTF, checked_crop
 from storage.readers.btf_names import UBO2003, UTIA, ordered_photographs
 from storage.readers.btf_pixels import colour_of, exr_pixels, linear_light
-from storage.readers.colour_spaces import CIE_XYZ, LINEAR_SRGB, ColourSpace, space_of
+from storage.readers.pictures.colour_spaces import CIE_XYZ, LINEAR_SRGB, ColourSpace, space_of
 
 ExrColours = Literal["auto", "rgb", "xyz"]
 

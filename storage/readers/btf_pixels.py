@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.btf_headers import Header
 from storage.readers.btf_measured import Crop
-from storage.readers.colour_profiles import without_profile
-from storage.readers.colour_spaces import ColourSpace
-from storage.readers.radiance_files import radiance_pixels
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.colour_profiles import without_profile
+from storage.readers.pictures.colour_spaces import ColourSpace
+from storage.readers.pictures.radiance_files import radiance_pixels
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 
 def colour_of(header: Header, space: ColourSpace) -> str:

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.drive_transforms import Frame, Lens, read_transforms, shown_number
-from storage.readers.image_decoding import decode_image
 from storage.readers.opening import check_file, check_memory, first_bytes
-from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
-from storage.readers.pillow_pictures import opened
-from storage.readers.srgb_curve import srgb_of_light
+from storage.readers.pictures.image_decoding import decode_image
+from storage.readers.pictures.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
+from storage.readers.pictures.pillow_pictures import opened
+from storage.readers.pictures.srgb_curve import srgb_of_light
 
 FEWEST_CAMERAS = 2
 MOST_CAMERAS = 500

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.exr_files import exr_header, read_exr
 from storage.readers.opening import check_memory, first_bytes
-from storage.readers.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
-from storage.readers.radiance_files import (
+from storage.readers.pictures.exr_files import exr_header, read_exr
+from storage.readers.pictures.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
+from storage.readers.pictures.radiance_files import (
     SIGNATURE,
     RadianceHeader,
     radiance_header,
     radiance_pixels,
 )
-from storage.readers.radiance_values import mended
+from storage.readers.pictures.radiance_values import mended
 
 SMALLEST_WIDTH = 16
 LARGEST_WIDTH = 16384
@@ -126,7 +126,7 @@ def _exr_picture(file: Path) -> tuple[NDArray[Any], bool, tuple[str, ...]]:
 
 
 def _check_size(file: Path, width: int, height: int, cube: bool) -> None:
-    from storage.readers.cube_maps import is_cross
+    from storage.readers.pictures.cube_maps import is_cross
 
     found = f"{width} x {height} pixels"
     if cube:
@@ -164,7 +164,7 @@ def _equirectangular(
     file: Path, light: NDArray[Any], cube: bool
 ) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Twice as wide as high, at most 16384 wide."""
-    from storage.readers import cube_maps
+    from storage.readers.pictures import cube_maps
 
     notes = []
     height, width = light.shape[:2]

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.decoded_image import DecodedImage
-from storage.readers.image_decoding import decode_image
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.decoded_image import DecodedImage
+from storage.readers.pictures.image_decoding import decode_image
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 SMALLEST_SIDE = 64
 SUFFIXES = (

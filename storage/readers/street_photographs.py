@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.image_decoding import decode_image
-from storage.readers.srgb_curve import srgb_of_light
+from storage.readers.pictures.image_decoding import decode_image
+from storage.readers.pictures.srgb_curve import srgb_of_light
 
 _NAMES = (
     "astronaut",

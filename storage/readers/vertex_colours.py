@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 
 def linear_colours(coded: NDArray[np.float64], full: float) -> NDArray[np.float64] | None:

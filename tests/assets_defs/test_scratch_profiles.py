@@ -12,7 +12,7 @@ from assets_defs.glass_scratches.profile_files import load_profile
 from assets_defs.glass_scratches.tables import ProfileSettings, scratch_profile
 from assets_defs.sources import Source
 from assets_defs.system import NOTES
-from storage.readers import profile_columns
+from storage.readers.profiles import columns as profile_columns
 
 MILLIMETRES_AND_NANOMETRES = "x [mm],z [nm]\n-0.006,0\n-0.001,-3000\n0.002,-2000\n0.006,0\n"
 

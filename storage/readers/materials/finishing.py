@@ -18,7 +18,7 @@ from storage.readers.materials.material import (
     Varying,
 )
 from storage.readers.materials.pictures import Pictures, side_for
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 _MAPPINGS = 2
 _FARTHEST = 1e6  # textures: single precision knows no place of a texel farther out

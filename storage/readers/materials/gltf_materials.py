@@ -15,7 +15,7 @@ from storage.readers.materials.description import Description, Map, Share
 from storage.readers.materials.gltf_textures import Textures
 from storage.readers.materials.gltf_values import Values
 from storage.readers.materials.material import DIELECTRIC, Colour
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 _EMISSION = "KHR_materials_emissive_strength"
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"

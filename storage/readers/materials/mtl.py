@@ -16,7 +16,7 @@ from storage.readers.materials.description import Channel, Description, Map, Sha
 from storage.readers.materials.material import DIELECTRIC, Colour
 from storage.readers.materials.mtl_maps import read_map
 from storage.readers.opening import number, whole_file
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 _LARGEST_LIBRARY = 16 << 20  # bytes
 _BYTE_CODES = 2.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
 from storage.readers.materials.description import Map
-from storage.readers.srgb_curve import light_of_srgb, srgb_of_light
+from storage.readers.pictures.srgb_curve import light_of_srgb, srgb_of_light
 
 MOST_TEXELS = 32 << 20
 """Of all textures of a scene."""

@@ -18,7 +18,7 @@ from PIL import Image
 
 from storage.readers import BadInput
 from storage.readers.environments import read_environment
-from storage.readers.radiance_values import mended
+from storage.readers.pictures.radiance_values import mended
 
 HEIGHT, WIDTH = 20, 40
 

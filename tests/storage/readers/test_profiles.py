@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from storage.readers import BadInput
-from storage.readers.profiles import MOST_POINTS, ProfileFile, read_profile
+from storage.readers.profiles import ProfileFile, read_profile
+from storage.readers.profiles.reading import MOST_POINTS
 
 GROOVE = [(-3.0, 0.0), (-1.5, 0.25), (0.0, -1.75), (3.0, 0.0)]
 

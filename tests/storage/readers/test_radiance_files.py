@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from storage.readers import BadInput
-from storage.readers.radiance_files import radiance_header, radiance_pixels
+from storage.readers.pictures.radiance_files import radiance_header, radiance_pixels
 from tests.storage.readers.btf_writers import hdr_bytes, light_of_rgbe
 
 FILE = Path("in/tl000 pl000 tv000 pv000.hdr")

@@ -18,9 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.colour_spaces import CIE_XYZ, LINEAR_SRGB, ColourSpace, named_space, space_of
 from storage.readers.opening import number
-from storage.readers.radiance_runs import decoded_lines
+from storage.readers.pictures.colour_spaces import (
+    CIE_XYZ,
+    LINEAR_SRGB,
+    ColourSpace,
+    named_space,
+    space_of,
+)
+from storage.readers.pictures.radiance_runs import decoded_lines
 
 SIGNATURE = b"#?"
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
-from storage.readers.profile_cells import SEPARATORS, decimal_mark, is_missing, number_of
-from storage.readers.profile_statements import Axis, stated_step, stated_units
-from storage.readers.profile_tables import Table
-from storage.readers.profile_units import DEPTHS, Column, micrometres, set_of
+from storage.readers.profiles.cells import SEPARATORS, decimal_mark, is_missing, number_of
+from storage.readers.profiles.statements import Axis, stated_step, stated_units
+from storage.readers.profiles.tables import Table
+from storage.readers.profiles.units import DEPTHS, Column, micrometres, set_of
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.decoded_image import Space, StoredPicture
-from storage.readers.picture_sizes import check_area
+from storage.readers.pictures.decoded_image import Space, StoredPicture
+from storage.readers.pictures.picture_sizes import check_area
 
 if TYPE_CHECKING:
     from PIL import Image, ImageFile

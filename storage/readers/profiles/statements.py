@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from storage.readers.bad_input import BadInput
-from storage.readers.profile_cells import number_of
-from storage.readers.profile_units import column_of, micrometres, role_of, set_of
+from storage.readers.profiles.cells import number_of
+from storage.readers.profiles.units import column_of, micrometres, role_of, set_of
 
 Axis = Literal["v", "n"]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from storage.readers.bad_input import BadInput
-from storage.readers.decoded_image import StoredPicture
-from storage.readers.picture_sizes import check_area
-from storage.readers.pillow_pictures import as_alpha, load, stored_picture
+from storage.readers.pictures.decoded_image import StoredPicture
+from storage.readers.pictures.picture_sizes import check_area
+from storage.readers.pictures.pillow_pictures import as_alpha, load, stored_picture
 
 _CODESTREAM = b"\xff\x4f\xff\x51"  # how one begins; its header (SIZ) follows
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.profile_cells import is_missing, number_of
-from storage.readers.profile_units import micrometres
+from storage.readers.profiles.cells import is_missing, number_of
+from storage.readers.profiles.units import micrometres
 
 _LARGEST_SCALE = 1e9  # micrometres a count
 _TABLE = "columns of positions and heights: export as a table of text"

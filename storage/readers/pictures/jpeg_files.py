@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from storage.readers.bad_input import BadInput
-from storage.readers.code_points import in_srgb
-from storage.readers.decoded_image import StoredPicture
-from storage.readers.pillow_pictures import load, opened, stored_picture
+from storage.readers.pictures.code_points import in_srgb
+from storage.readers.pictures.decoded_image import StoredPicture
+from storage.readers.pictures.pillow_pictures import load, opened, stored_picture
 
 _MANY_SCANS = 64  # of a JPEG, each of which takes as long as all of the picture; 10 are usual
 _MOST_SCANNED = 1_000_000_000  # pixels, which take some seconds

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from storage.readers.decoded_image import StoredPicture
-from storage.readers.pillow_pictures import load, stored_picture
+from storage.readers.pictures.decoded_image import StoredPicture
+from storage.readers.pictures.pillow_pictures import load, stored_picture
 
 _V5_HEADER = 124  # bytes
 _EMBEDDED = b"DEBM"  # the colour space's code where a profile is in the file

@@ -17,17 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.code_points import CodePoints, in_srgb
-from storage.readers.colour_spaces import SRGB
-from storage.readers.decoded_image import Space, StoredPicture, by_code_points, damaged
-from storage.readers.pillow_pictures import (
+from storage.readers.pictures.code_points import CodePoints, in_srgb
+from storage.readers.pictures.colour_spaces import SRGB
+from storage.readers.pictures.decoded_image import Space, StoredPicture, by_code_points, damaged
+from storage.readers.pictures.pillow_pictures import (
     animation_notes,
     as_alpha,
     load,
     orientation_of,
     stored_picture,
 )
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.colour_spaces import SRGB, space_of, srgb_of_xyz
-from storage.readers.srgb_curve import light_of_srgb
+from storage.readers.pictures.colour_spaces import SRGB, space_of, srgb_of_xyz
+from storage.readers.pictures.srgb_curve import light_of_srgb
 
 Primaries = tuple[float, float, float, float, float, float, float, float]
 """Chromaticities x, y of red, green, blue and white."""

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.profile_columns import positions_and_heights
-from storage.readers.profile_records import record_of
-from storage.readers.profile_tables import MOST_POINTS, table_of, too_many
-from storage.readers.profile_text import lines_of, text_of
+from storage.readers.profiles.columns import positions_and_heights
+from storage.readers.profiles.records import record_of
+from storage.readers.profiles.tables import MOST_POINTS, table_of, too_many
+from storage.readers.profiles.text import lines_of, text_of
 
 __all__ = ["FEWEST_POINTS", "MOST_POINTS", "ProfileFile", "read_profile"]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from storage.readers.bad_input import BadInput
-from storage.readers.profile_cells import SEPARATORS, cells_of, is_missing, number_of
-from storage.readers.profile_units import Column, column_of, micrometres
+from storage.readers.profiles.cells import SEPARATORS, cells_of, is_missing, number_of
+from storage.readers.profiles.units import Column, column_of, micrometres
 
 MOST_POINTS = 100_000
 

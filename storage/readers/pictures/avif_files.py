@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from storage.readers.code_points import CodePoints
-from storage.readers.decoded_image import StoredPicture, by_code_points, damaged
-from storage.readers.pillow_pictures import animation_notes, as_alpha, load, stored_picture
+from storage.readers.pictures.code_points import CodePoints
+from storage.readers.pictures.decoded_image import StoredPicture, by_code_points, damaged
+from storage.readers.pictures.pillow_pictures import animation_notes, as_alpha, load, stored_picture
 
 _GAIN_MAP = "Its gain map (HDR) was left out: the picture without it was read."
 

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers import exr_layers
 from storage.readers.bad_input import BadInput, shortened
-from storage.readers.colour_spaces import (
+from storage.readers.opening import check_memory
+from storage.readers.pictures import exr_layers
+from storage.readers.pictures.colour_spaces import (
     CIE_XYZ,
     LINEAR_SRGB,
     SRGB,
@@ -25,8 +26,7 @@ from storage.readers.colour_spaces import (
     named_space,
     space_of,
 )
-from storage.readers.opening import check_memory
-from storage.readers.picture_sizes import MEMORY_PER_BYTE, check_area
+from storage.readers.pictures.picture_sizes import MEMORY_PER_BYTE, check_area
 
 LARGEST_HALF = 65504.0
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from storage.readers.srgb_curve import srgb_of_light
+from storage.readers.pictures.srgb_curve import srgb_of_light
 
 _SPACES = {b"GRAY": ("gray", 1), b"RGB ": ("rgb", 3), b"CMYK": ("cmyk", 4)}
 _NO_USE = (

@@ -13,18 +13,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from storage.readers.avif_files import read_avif
 from storage.readers.bad_input import BadInput
-from storage.readers.bmp_files import read_bmp
-from storage.readers.decoded_image import DecodedImage, StoredPicture, damaged, decoded, straight
-from storage.readers.exr_files import read_exr
-from storage.readers.jpeg2000_files import read_jpeg2000
-from storage.readers.jpeg_files import read_jpeg
 from storage.readers.opening import first_bytes
-from storage.readers.picture_sizes import LARGEST_PICTURE
-from storage.readers.pillow_pictures import animation_notes, load, stored_picture
-from storage.readers.png_files import read_png
-from storage.readers.tiff_files import read_tiff
+from storage.readers.pictures.avif_files import read_avif
+from storage.readers.pictures.bmp_files import read_bmp
+from storage.readers.pictures.decoded_image import (
+    DecodedImage,
+    StoredPicture,
+    damaged,
+    decoded,
+    straight,
+)
+from storage.readers.pictures.exr_files import read_exr
+from storage.readers.pictures.jpeg2000_files import read_jpeg2000
+from storage.readers.pictures.jpeg_files import read_jpeg
+from storage.readers.pictures.picture_sizes import LARGEST_PICTURE
+from storage.readers.pictures.pillow_pictures import animation_notes, load, stored_picture
+from storage.readers.pictures.png_files import read_png
+from storage.readers.pictures.tiff_files import read_tiff
 
 FORMATS = "a PNG, JPEG, TIFF, WebP, AVIF, BMP, GIF, JPEG 2000 or EXR photograph"
 _EXPORT = "export it as a 16-bit TIFF, a PNG or a JPEG"

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.code_points import rgb_of_lab
-from storage.readers.decoded_image import Space, StoredPicture, damaged, straight
-from storage.readers.jpeg_files import frame_of
-from storage.readers.picture_sizes import check_area
-from storage.readers.pillow_pictures import as_alpha, load, stored_picture
+from storage.readers.pictures.code_points import rgb_of_lab
+from storage.readers.pictures.decoded_image import Space, StoredPicture, damaged, straight
+from storage.readers.pictures.jpeg_files import frame_of
+from storage.readers.pictures.picture_sizes import check_area
+from storage.readers.pictures.pillow_pictures import as_alpha, load, stored_picture
 
 if TYPE_CHECKING:
     import tifffile

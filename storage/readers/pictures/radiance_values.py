@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.exr_files import LARGEST_HALF
+from storage.readers.pictures.exr_files import LARGEST_HALF
 
 _MOST_MISSING = 0.01  # of the texels
 _MOST_NEGATIVE = 0.5

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.code_points import CodePoints, light_of_code_points
-from storage.readers.colour_profiles import without_profile
+from storage.readers.pictures.code_points import CodePoints, light_of_code_points
+from storage.readers.pictures.colour_profiles import without_profile
 
 Space = Literal["grey", "RGB", "CMYK"]
 

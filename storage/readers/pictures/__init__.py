@@ -1,0 +1,1 @@
+"""Pictures of every format to arrays, with their colours: photographs, radiance, textures."""
