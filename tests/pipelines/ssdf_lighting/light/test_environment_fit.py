@@ -137,7 +137,7 @@ def test_irradiance_is_near(clear: NDArray[np.float32], clear_fit: Fit) -> None:
     ("light", "count"),
     [
         (lamps(96), 5),
-        (lamps(96), 20),
+        pytest.param(lamps(96), 20, marks=pytest.mark.slow),
         (uniform(8, 3e-5), 3),
         (np.float32(1e30) * lamps(10), 1),
         (np.exp(np.random.default_rng(3).normal(0, 3, (6, 12, 3))).astype(np.float32), 8),
