@@ -200,7 +200,7 @@ CONTAINERS: tuple[Case, ...] = (
     _read("gltf_percent.gltf", "names in URIs", _beside("100%.bin", "100%.bin")),
     _read("gltf_umlaut.gltf", "names in URIs", _beside(quote("Würfel.bin"), "Würfel.bin")),
     _read("gltf_backslash.gltf", "names in URIs", _beside("parts\\a.bin", "parts/a.bin")),
-    _read("gltf_other_folder.gltf", "names in URIs", _beside("C:/work/a.bin", "a.bin")),
+    _read("gltf_other_folder.gltf", "names in URIs", _beside("C:/models/a.bin", "a.bin")),
     _read("gltf_embedded.gltf", "data URIs", _with_uri(_standard, _same)),
     _read("gltf_url_base64.gltf", "data URIs", _with_uri(_for_urls, _same)),
     _read("gltf_escaped.gltf", "data URIs", _with_uri(_standard, _escaped)),

@@ -10,44 +10,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.captures.case import Case, Ending
 from benchmarks.captures.photograph_files import (
     DISPLAY_P3,
     HEIGHT,
     REC_2020,
     SRGB,
     WIDTH,
-    Right,
     Writer,
     exif,
     in_srgb,
     is_light,
     light_of,
     noise,
+    photo_case,
     rgb_profile,
     save_pillow,
     slope,
     stored_as,
 )
-from storage.readers.photographs import read_photograph
 
 _PLAIN, _DEEP, _GREY, _SLOPE = noise(), noise(np.uint16), noise(channels=1), slope()
 _LOSSY = 0.03
 _CUT_OUT = "a cut-out by alpha"
 _ANIMATION = "an animation: its first picture"
 _PHONE = "what phones add to a JPEG"
-
-
-def _case(
-    name: str,
-    kind: str,
-    right: Right | None,
-    write: Writer,
-    *says: str,
-    ends: Ending | None = None,
-) -> Case:
-    ending: Ending = ends or ("told" if says else "read")
-    return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
 
 
 _alpha = np.zeros((HEIGHT, WIDTH), np.uint8)
@@ -96,26 +82,26 @@ def _pq(share: NDArray[Any]) -> NDArray[np.float64]:
 
 _ten, _twelve = noise(np.uint16, bits=10), noise(np.uint16, bits=12)
 _AVIFS = (
-    _case(
+    photo_case(
         "10_bits.avif",
         "AVIF: 10 and 12 bits",
         is_light(light_of(_ten, 1023), 1e-4),
         _save_avif(10, _ten, 1, 13),
     ),
-    _case(
+    photo_case(
         "12_bits.avif",
         "AVIF: 10 and 12 bits",
         is_light(light_of(_twelve, 4095), 1e-4),
         _save_avif(12, _twelve, 1, 13),
     ),
-    _case(
+    photo_case(
         "p3.avif",
         "AVIF: colours by code points",
         is_light(in_srgb(light_of(_PLAIN), DISPLAY_P3), 1e-4),
         _save_avif(8, _PLAIN, 12, 13),
         "Display P3",
     ),
-    _case(
+    photo_case(
         "pq.avif",
         "AVIF: colours by code points",
         is_light(in_srgb(_pq(_ten / 1023), REC_2020), 0.02),
@@ -123,7 +109,7 @@ _AVIFS = (
         "BT.2020, PQ",
     ),
     *(
-        _case(
+        photo_case(
             f"turned_{orientation}.avif",
             "turned upright: AVIF, WebP",
             is_light(light_of(_SLOPE), _LOSSY),
@@ -136,14 +122,14 @@ _AVIFS = (
         )
         for orientation in (2, 5, 6, 8)
     ),
-    _case(
+    photo_case(
         "cutout.avif",
         _CUT_OUT,
         is_light(light_of(_SLOPE), _LOSSY, opaque=_opaque),
         save_pillow(np.dstack([_SLOPE, _alpha]), quality=100, subsampling="4:4:4"),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "sequence.avif",
         _ANIMATION,
         is_light(light_of(_PLAIN), 0.25),
@@ -152,23 +138,27 @@ _AVIFS = (
     ),
 )
 _WEBPS = (
-    _case("lossy.webp", "WebP", is_light(light_of(_SLOPE), 0.05), save_pillow(_SLOPE, quality=95)),
-    _case("lossless.webp", "WebP", is_light(light_of(_PLAIN)), save_pillow(_PLAIN, lossless=True)),
-    _case(
+    photo_case(
+        "lossy.webp", "WebP", is_light(light_of(_SLOPE), 0.05), save_pillow(_SLOPE, quality=95)
+    ),
+    photo_case(
+        "lossless.webp", "WebP", is_light(light_of(_PLAIN)), save_pillow(_PLAIN, lossless=True)
+    ),
+    photo_case(
         "cutout.webp",
         _CUT_OUT,
         is_light(light_of(_PLAIN), opaque=_opaque),
         save_pillow(np.dstack([_PLAIN, _alpha]), lossless=True, exact=True),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "animated.webp",
         _ANIMATION,
         is_light(light_of(_PLAIN)),
         lambda path: _save_frames(path, lossless=True),
         "animation",
     ),
-    _case(
+    photo_case(
         "turned_7.webp",
         "turned upright: AVIF, WebP",
         is_light(light_of(_PLAIN)),
@@ -223,51 +213,51 @@ _runs = b"".join(
 _greys = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 4, axis=1).tobytes()
 _BGRA = (0xFF0000, 0xFF00, 0xFF, 0xFF000000)
 _BMPS = (
-    _case("24.bmp", "BMP", is_light(light_of(_PLAIN)), _bmp(_rows(_bgr), 24)),
-    _case(
+    photo_case("24.bmp", "BMP", is_light(light_of(_PLAIN)), _bmp(_rows(_bgr), 24)),
+    photo_case(
         "top_down.bmp",
         "BMP",
         is_light(light_of(_PLAIN)),
         _bmp(_rows(_bgr, bottom_up=False), 24, height=-HEIGHT),
     ),
-    _case(
+    photo_case(
         "16.bmp",
         "BMP",
         is_light(light_of(_six / np.array([31, 63, 31]), 1), 0.01),
         _bmp(_rows(_565), 16, compression=3, masks=(0xF800, 0x07E0, 0x1F, 0)),
     ),
-    _case(
+    photo_case(
         "4.bmp",
         "palettes",
         is_light(light_of(_colours[_numbers[..., 0]])),
         _bmp(_rows(_nibbles), 4, palette=_bgra_palette),
     ),
-    _case(
+    photo_case(
         "runs.bmp",
         "BMP",
         is_light(light_of(_GREY)),
         _bmp(_runs + b"\0\1", 8, compression=1, palette=_greys),
     ),
-    _case(
+    photo_case(
         "32.bmp",
         "BMP",
         is_light(light_of(_PLAIN)),
         _bmp(_rows(np.dstack([_bgr, _alpha])), 32),
     ),
-    _case(
+    photo_case(
         "cutout.bmp",
         _CUT_OUT,
         is_light(light_of(_PLAIN), opaque=_opaque),
         _bmp(_rows(np.dstack([_bgr, _alpha])), 32, compression=3, masks=_BGRA),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "alpha_unused.bmp",
         "alpha that nobody filled in",
         is_light(light_of(_PLAIN)),
         _bmp(_rows(np.dstack([_bgr, _alpha * 0])), 32, compression=3, masks=_BGRA),
     ),
-    _case(
+    photo_case(
         "profile.bmp",
         "8 bits with another profile than sRGB's",
         is_light((_PLAIN / 255) ** (461 / 256), 1e-3),
@@ -276,15 +266,15 @@ _BMPS = (
     ),
 )
 _GIFS = (
-    _case(
+    photo_case(
         "animated.gif",
         _ANIMATION,
         is_light(light_of(_GREY)),
         lambda path: _save_gif(path, more=2),
         "animation",
     ),
-    _case("still.gif", "GIF", is_light(light_of(_GREY)), lambda path: _save_gif(path)),
-    _case(
+    photo_case("still.gif", "GIF", is_light(light_of(_GREY)), lambda path: _save_gif(path)),
+    photo_case(
         "holes.gif",
         _CUT_OUT,
         is_light(light_of(_GREY), opaque=_GREY[..., 0] > 30),
@@ -304,15 +294,15 @@ def _save_gif(path: Path, *, more: int = 0, transparent: bool = False) -> None:
 
 
 _JPEG2000S = (
-    _case("8.jp2", "JPEG 2000", is_light(light_of(_PLAIN)), save_pillow(_PLAIN)),
-    _case("stream.j2k", "JPEG 2000", is_light(light_of(_PLAIN)), save_pillow(_PLAIN)),
-    _case(
+    photo_case("8.jp2", "JPEG 2000", is_light(light_of(_PLAIN)), save_pillow(_PLAIN)),
+    photo_case("stream.j2k", "JPEG 2000", is_light(light_of(_PLAIN)), save_pillow(_PLAIN)),
+    photo_case(
         "16.jp2",
         "JPEG 2000",
         is_light(light_of(_DEEP)),
         lambda path: _save_jpeg2000(path, _DEEP),
     ),
-    _case(
+    photo_case(
         "cutout.jp2",
         _CUT_OUT,
         is_light(light_of(_PLAIN), opaque=_opaque),

@@ -11,9 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.captures.case import Case, Ending
+from storage.readers.photographs import read_photograph
+
 HEIGHT, WIDTH = 66, 70
 Right = Callable[[Any], bool]
 Writer = Callable[[Path], object]
+
+
+def photo_case(
+    name: str,
+    kind: str,
+    right: Right | None,
+    write: Writer,
+    *says: str,
+    ends: Ending | None = None,
+) -> Case:
+    """A photograph; told where something is to be said of it, else read without a word."""
+    ending: Ending = ends or ("told" if says else "read")
+    return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
 
 
 def noise(dtype: Any = np.uint8, channels: int = 3, bits: int | None = None) -> NDArray[Any]:

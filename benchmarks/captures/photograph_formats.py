@@ -11,43 +11,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.captures.case import Case, Ending
 from benchmarks.captures.photograph_files import (
     ADOBE_RGB,
     HEIGHT,
     WIDTH,
-    Right,
     Writer,
     exif,
     in_srgb,
     is_light,
     light_of,
     noise,
+    photo_case,
     png,
     png_chunk,
     save_png,
     slope,
     stored_as,
 )
-from storage.readers.photographs import read_photograph
 
 _PLAIN, _DEEP, _GREY, _SLOPE = noise(), noise(np.uint16), noise(channels=1), slope()
 _LOSSY = 0.03
 _CUT_OUT = "a cut-out by alpha"
 _ANIMATION = "an animation: its first picture"
 _PHONE = "what phones add to a JPEG"
-
-
-def _case(
-    name: str,
-    kind: str,
-    right: Right | None,
-    write: Writer,
-    *says: str,
-    ends: Ending | None = None,
-) -> Case:
-    ending: Ending = ends or ("told" if says else "read")
-    return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
 
 
 def _save(data: bytes) -> Writer:
@@ -74,21 +60,21 @@ _numbers = noise(channels=1, bits=4)
 _colours = np.random.default_rng(4).integers(0, 256, (16, 3)).astype(np.uint8)
 _plte = (b"PLTE", _colours.tobytes())
 _PNGS = (
-    _case(
+    photo_case(
         "cutout_16.png",
         _CUT_OUT,
         is_light(light_of(_DEEP), opaque=_opaque),
         save_png(np.dstack([_DEEP, _alpha.astype(np.uint16) * 257]), 6),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "cutout_grey.png",
         _CUT_OUT,
         is_light(light_of(_GREY), opaque=_opaque),
         save_png(np.dstack([_GREY, _alpha]), 4),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "cutout_soft.png",
         "partly transparent pixels",
         is_light(light_of(_PLAIN), opaque=_opaque),
@@ -96,14 +82,14 @@ _PNGS = (
         *_HOLES,
         "100 % of the pixels are partly transparent",
     ),
-    _case(
+    photo_case(
         "nearly_opaque.png",
         "partly transparent pixels",
         is_light(light_of(_PLAIN)),
         save_png(np.dstack([_PLAIN, np.maximum(_soft, 250)]), 6),
         "partly transparent",
     ),
-    _case(
+    photo_case(
         "all_transparent.png",
         "a picture that is all transparent",
         None,
@@ -112,33 +98,33 @@ _PNGS = (
         "save it without its alpha",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "opaque_alpha.png",
         "alpha that is opaque",
         is_light(light_of(_DEEP)),
         save_png(np.dstack([_DEEP, np.full_like(_DEEP[..., 0], 65535)]), 6),
     ),
-    _case(
+    photo_case(
         "key_grey.png",
         "a colour that stands for holes",
         is_light(light_of(_GREY), opaque=_grey_key[0]),
         save_png(_GREY, 0, _grey_key[1]),
         *_HOLES,
     ),
-    _case(
+    photo_case(
         "key_16.png",
         "a colour that stands for holes",
         is_light(light_of(_DEEP), opaque=_deep_key[0]),
         save_png(_DEEP, 2, _deep_key[1]),
         "less than 0.1 % of the pixels are transparent",
     ),
-    _case(
+    photo_case(
         "palette.png",
         "palettes",
         is_light(light_of(_colours[_numbers[..., 0]])),
         save_png(_numbers, 3, _plte, bits=4),
     ),
-    _case(
+    photo_case(
         "palette_holes.png",
         "palettes",
         is_light(light_of(_colours[_numbers[..., 0]]), opaque=_numbers[..., 0] != 2),
@@ -146,7 +132,7 @@ _PNGS = (
         *_HOLES,
     ),
     *(
-        _case(
+        photo_case(
             f"grey_{bits}.png",
             "PNG: less than 8 bits",
             is_light(light_of(noise(channels=1, bits=bits), (1 << bits) - 1), 3e-3),
@@ -154,26 +140,26 @@ _PNGS = (
         )
         for bits in (1, 2, 4)
     ),
-    _case(
+    photo_case(
         "significant_bits.png",
         "PNG: significant bits",
         is_light(light_of(_DEEP)),
         save_png(_DEEP, 2, (b"sBIT", b"\x0a\x0a\x0a")),
     ),
-    _case(
+    photo_case(
         "text_damaged.png",
         "PNG: a chunk beside the picture is damaged",
         is_light(light_of(_PLAIN)),
         _save(png(_PLAIN, 2, (b"tEXt", b"a\0bcd")).replace(b"a\0bcd", b"a\0bXd")),
         "checksum were left out: tEXt",
     ),
-    _case(
+    photo_case(
         "interlaced.png",
         "PNG: interlaced",
         is_light(light_of(_PLAIN)),
         lambda path: _save(_interlaced(_PLAIN))(path),
     ),
-    _case(
+    photo_case(
         "animated.png",
         _ANIMATION,
         is_light(light_of(_PLAIN)),
@@ -181,7 +167,7 @@ _PNGS = (
         "animation",
     ),
     *(
-        _case(
+        photo_case(
             f"turned_{orientation}.png",
             "turned upright: PNG",
             is_light(light_of(codes)),
@@ -189,7 +175,7 @@ _PNGS = (
         )
         for orientation, codes in ((3, _DEEP), (8, _PLAIN))
     ),
-    _case(
+    photo_case(
         "turned_cutout.png",
         "turned upright: PNG",
         is_light(light_of(_PLAIN), opaque=_opaque),
@@ -268,25 +254,25 @@ def _interoperability(index: bytes) -> bytes:
 
 _SMOOTH = is_light(light_of(_SLOPE), _LOSSY)
 _JPEGS = (
-    _case(
+    photo_case(
         "progressive.jpg",
         "JPEG: codings",
         _SMOOTH,
         _save(_jpeg(progressive=True)),
     ),
-    _case(
+    photo_case(
         "grey.jpg",
         "JPEG: codings",
         is_light(light_of(_SLOPE[..., 1:2]), _LOSSY),
         _save(_jpeg(_SLOPE[..., 1:2])),
     ),
-    _case(
+    photo_case(
         "rgb.jpg",
         "JPEG: codings",
         _SMOOTH,
         _save(_jpeg(keep_rgb=True)),
     ),
-    _case(
+    photo_case(
         "bits_12.jpg",
         "JPEG: 12 bits, lossless",
         None,
@@ -295,7 +281,7 @@ _JPEGS = (
         "16-bit TIFF",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "lossless.jpg",
         "JPEG: 12 bits, lossless",
         None,
@@ -305,7 +291,7 @@ _JPEGS = (
         ends="refused",
     ),
     *(
-        _case(
+        photo_case(
             f"turned_{orientation}.jpg",
             "turned upright: JPEG",
             _SMOOTH,
@@ -313,67 +299,67 @@ _JPEGS = (
         )
         for orientation in (3, 6, 8)
     ),
-    _case(
+    photo_case(
         "turned_by_xmp.jpg",
         "turned upright: JPEG",
         is_light(light_of(stored_as(_SLOPE, 3)), _LOSSY),
         _with_segment(0xE1, _xmp('<x tiff:Orientation="3"/>')),
     ),
-    _case(
+    photo_case(
         "adobergb_by_exif.jpg",
         "a colour space named in EXIF alone",
         is_light(np.clip(in_srgb((_SLOPE / 255) ** (563 / 256), ADOBE_RGB), 0, 1), _LOSSY),
         _with_segment(0xE1, b"Exif\0\0" + _interoperability(b"R03\0")),
         "Adobe RGB",
     ),
-    _case(
+    photo_case(
         "srgb_by_exif.jpg",
         "a colour space named in EXIF alone",
         _SMOOTH,
         _with_segment(0xE1, b"Exif\0\0" + _interoperability(b"R98\0")),
     ),
-    _case(
+    photo_case(
         "exif_damaged.jpg",
         "a damaged EXIF block",
         _SMOOTH,
         _with_segment(0xE1, b"Exif\0\0II*\0\xff\xff\xff\x7f"),
         "EXIF block is damaged",
     ),
-    _case(
+    photo_case(
         "gain_map.jpg",
         _PHONE,
         _SMOOTH,
         _with_segment(0xE1, _xmp('<x hdrgm:Version="1.0"/>'), _jpeg(_SLOPE[..., :1])),
         "gain map",
     ),
-    _case(
+    photo_case(
         "depth_map.jpg",
         _PHONE,
         _SMOOTH,
         _with_segment(0xE1, _xmp('<x GDepth:Format="RangeInverse" GDepth:Near="1"/>')),
         "depth map",
     ),
-    _case(
+    photo_case(
         "motion.jpg",
         _PHONE,
         _SMOOTH,
         _with_segment(0xE1, _xmp('<x GCamera:MotionPhoto="1"/>'), b"\0\0\0\x18ftypmp42"),
         "film",
     ),
-    _case(
+    photo_case(
         "second_view.jpg",
         _PHONE,
         _SMOOTH,
         _with_segment(0xE2, _mpf([0x030000, 0x020002]), _jpeg()),
         "1 more picture",
     ),
-    _case(
+    photo_case(
         "large_preview.jpg",
         "previews inside a JPEG",
         _SMOOTH,
         _with_segment(0xE2, _mpf([0x030000, 0x010002]), _jpeg()),
     ),
-    _case(
+    photo_case(
         "truncated.jpg",
         "a truncated file",
         None,

@@ -8,22 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.captures.case import Case, Ending
+from benchmarks.captures.case import Case
 from benchmarks.captures.photograph_files import (
     HEIGHT,
     WIDTH,
-    Right,
     Writer,
     is_light,
     light_of,
     noise,
+    photo_case,
     save_tiff,
     slope,
     stored_as,
     thrice,
     tiff,
 )
-from storage.readers.photographs import read_photograph
 
 _PLAIN, _DEEP, _GREY = noise(), noise(np.uint16), noise(channels=1)
 _LAYOUT = "TIFF: planes, tiles, byte orders"
@@ -35,39 +34,29 @@ _PAGES = "TIFF: several pages"
 _REFUSED = "TIFF that holds no plain light"
 
 
-def _case(
-    name: str,
-    kind: str,
-    right: Right | None,
-    write: Writer,
-    *says: str,
-    ends: Ending | None = None,
-) -> Case:
-    ending: Ending = ends or ("told" if says else "read")
-    return Case(f"photo_{name}", kind, read_photograph, ending, says, right, write)
-
-
 # ---- layouts and compressions ------------------------------------------------------------------
 
 _planes = np.moveaxis(_PLAIN, -1, 0)
 _LAYOUTS = (
-    _case("planes.tif", _LAYOUT, is_light(light_of(_PLAIN)), save_tiff(_planes, planarconfig=2)),
-    _case(
+    photo_case(
+        "planes.tif", _LAYOUT, is_light(light_of(_PLAIN)), save_tiff(_planes, planarconfig=2)
+    ),
+    photo_case(
         "planes_tiles.tif",
         _LAYOUT,
         is_light(light_of(_PLAIN)),
         save_tiff(_planes, planarconfig=2, tile=(32, 16), compression="zlib"),
     ),
-    _case(
+    photo_case(
         "tiles_big_endian.tif",
         _LAYOUT,
         is_light(light_of(_DEEP)),
         save_tiff(_DEEP, tile=(16, 48), byteorder=">"),
     ),
-    _case("bigtiff.tif", _LAYOUT, is_light(light_of(_DEEP)), save_tiff(_DEEP, bigtiff=True)),
-    _case("strips.tif", _LAYOUT, is_light(light_of(_DEEP)), save_tiff(_DEEP, rowsperstrip=5)),
+    photo_case("bigtiff.tif", _LAYOUT, is_light(light_of(_DEEP)), save_tiff(_DEEP, bigtiff=True)),
+    photo_case("strips.tif", _LAYOUT, is_light(light_of(_DEEP)), save_tiff(_DEEP, rowsperstrip=5)),
     *(
-        _case(
+        photo_case(
             f"{name}.tif",
             _PACKED,
             is_light(light_of(_DEEP)),
@@ -81,20 +70,20 @@ _LAYOUTS = (
             ("zstd", True),
         )
     ),
-    _case(
+    photo_case(
         "float_predictor.tif",
         _PACKED,
         is_light(noise(np.float32)),
         save_tiff(noise(np.float32), compression="zlib", predictor=3),
     ),
-    _case(
+    photo_case(
         "jpeg_in_tiff.tif",
         _PACKED,
         is_light(light_of(slope()), 0.02),
         save_tiff(slope(), compression="jpeg", compressionargs={"level": 98}),
     ),
     *(
-        _case(
+        photo_case(
             f"{name}_in_tiff.tif",
             "TIFF: compressions that unfold to anything",
             None,
@@ -130,7 +119,7 @@ def _bits_case(bits: int, channels: int) -> Case:
     codes = noise(np.uint16, channels, bits)
     right = is_light(light_of(codes, (1 << bits) - 1), 2e-3 if bits < 8 else 2e-5)
     name = f"bits_{bits}_{'rgb' if channels == 3 else 'grey'}.tif"
-    return _case(name, _BITS, right, _packed(codes, bits))
+    return photo_case(name, _BITS, right, _packed(codes, bits))
 
 
 def _palette(scale: int) -> Writer:
@@ -146,29 +135,31 @@ def _palette(scale: int) -> Writer:
 _BY_PALETTE = light_of(np.random.default_rng(5).integers(0, 256, (3, 256)).T[_GREY[..., 0]], 255)
 _SAMPLES = (
     *(_bits_case(bits, channels) for bits, channels in ((1, 1), (2, 1), (4, 1), (10, 3), (12, 3))),
-    _case(
+    photo_case(
         "uint32.tif",
         _BITS,
         is_light(light_of(noise(np.uint32)), 2e-5),
         save_tiff(noise(np.uint32)),
     ),
-    _case("palette.tif", "TIFF: palettes", is_light(_BY_PALETTE, 1e-6), _palette(257)),
-    _case("palette_of_bytes.tif", "TIFF: palettes", is_light(_BY_PALETTE, 1e-6), _palette(1)),
-    _case(
+    photo_case("palette.tif", "TIFF: palettes", is_light(_BY_PALETTE, 1e-6), _palette(257)),
+    photo_case("palette_of_bytes.tif", "TIFF: palettes", is_light(_BY_PALETTE, 1e-6), _palette(1)),
+    photo_case(
         "white_is_zero.tif",
         "TIFF: white is zero",
         is_light(light_of(65535 - noise(np.uint16, 1))),
         save_tiff(noise(np.uint16, 1)[..., 0], photometric="miniswhite"),
     ),
-    _case("half.tif", _FLOATS, is_light(noise(np.float16), 1e-7), save_tiff(noise(np.float16))),
-    _case(
+    photo_case(
+        "half.tif", _FLOATS, is_light(noise(np.float16), 1e-7), save_tiff(noise(np.float16))
+    ),
+    photo_case(
         "half_grey.tif",
         _FLOATS,
         is_light(thrice(noise(np.float16, 1))),
         save_tiff(noise(np.float16, 1)[..., 0], photometric="minisblack"),
     ),
-    _case("double.tif", _FLOATS, is_light(noise(np.float64)), save_tiff(noise(np.float64))),
-    _case(
+    photo_case("double.tif", _FLOATS, is_light(noise(np.float64)), save_tiff(noise(np.float64))),
+    photo_case(
         "ycbcr.tif",
         "TIFF: luminance and colour differences",
         is_light(light_of(slope()), 0.03),
@@ -213,7 +204,7 @@ def _preview() -> NDArray[np.uint8]:
 
 
 _CONTENTS = (
-    _case(
+    photo_case(
         "alpha_straight.tif",
         _ALPHA,
         is_light(light_of(_DEEP), opaque=_opaque),
@@ -221,14 +212,14 @@ _CONTENTS = (
         "transparent and were left out",
         "partly transparent",
     ),
-    _case(
+    photo_case(
         "alpha_associated.tif",
         _ALPHA,
         is_light(light_of(_DEEP), 1e-4, opaque=_opaque),
         save_tiff(np.dstack([_associated, _alpha]), extrasamples=["assocalpha"]),
         "transparent and were left out",
     ),
-    _case(
+    photo_case(
         "alpha_grey.tif",
         _ALPHA,
         is_light(light_of(_DEEP[..., :1]), opaque=_opaque),
@@ -240,54 +231,54 @@ _CONTENTS = (
         ),
         "transparent",
     ),
-    _case(
+    photo_case(
         "channel_unspecified.tif",
         _ALPHA,
         is_light(light_of(_DEEP)),
         save_tiff(np.dstack([_DEEP, _alpha]), extrasamples=["unspecified"]),
         "1 extra channel",
     ),
-    _case(
+    photo_case(
         "spot_inks.tif",
         _ALPHA,
         is_light(light_of(_PLAIN)),
         save_tiff(np.dstack([_PLAIN, _PLAIN]), extrasamples=["unspecified"] * 3),
         "3 extra channels",
     ),
-    _case(
+    photo_case(
         "photoshop_layers.tif",
         "TIFF: layers of Photoshop",
         is_light(light_of(_PLAIN)),
         save_tiff(_PLAIN, extratags=[(37724, 7, None, b"Adobe Photoshop Document Data", True)]),
         "layers of Photoshop",
     ),
-    _case(
+    photo_case(
         "pages.tif",
         _PAGES,
         is_light(light_of(_PLAIN)),
         lambda path: _pages(path, (_PLAIN, {}), (255 - _PLAIN, {}), (_PLAIN // 2, {})),
         "first of 3 pages",
     ),
-    _case(
+    photo_case(
         "preview_last.tif",
         "TIFF: previews beside the picture",
         is_light(light_of(_PLAIN)),
         lambda path: _pages(path, (_PLAIN, {}), (_preview(), {"subfiletype": 1})),
     ),
-    _case(
+    photo_case(
         "preview_first.tif",
         "TIFF: previews beside the picture",
         is_light(light_of(_PLAIN)),
         lambda path: _pages(path, (_preview(), {"subfiletype": 1}), (_PLAIN, {})),
     ),
-    _case(
+    photo_case(
         "page_below.tif",
         _PAGES,
         is_light(light_of(_PLAIN)),
         lambda path: _save_below(path),
         "pages below",
     ),
-    _case(
+    photo_case(
         "imagej_stack.tif",
         _PAGES,
         is_light(light_of(_GREY)),
@@ -295,7 +286,7 @@ _CONTENTS = (
         "first of 4 pages",
     ),
     *(
-        _case(
+        photo_case(
             f"turned_{orientation}.tif",
             "turned upright: TIFF",
             is_light(light_of(_DEEP)),
@@ -323,7 +314,7 @@ def _save_imagej(path: Path) -> None:
 _Tags = dict[int, tuple[int, list[int]]]
 _DNG: _Tags = {258: (3, [16]), 262: (3, [32803]), 50706: (1, [1, 4, 0, 0])}
 _REFUSALS = (
-    _case(
+    photo_case(
         "sensor.dng",
         "camera raw",
         None,
@@ -332,7 +323,7 @@ _REFUSALS = (
         "export it as a 16-bit TIFF",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "sensor_below.nef",
         "camera raw",
         None,
@@ -341,7 +332,7 @@ _REFUSALS = (
         "export it as a 16-bit TIFF",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "signed.tif",
         _REFUSED,
         None,
@@ -350,10 +341,10 @@ _REFUSALS = (
         "save it again",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "uint64.tif", _REFUSED, None, save_tiff(noise(np.uint64)), "save it again", ends="refused"
     ),
-    _case(
+    photo_case(
         "complex.tif",
         _REFUSED,
         None,
@@ -362,7 +353,7 @@ _REFUSALS = (
         "save it again",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "logluv.tif",
         _REFUSED,
         None,
@@ -371,7 +362,7 @@ _REFUSALS = (
         "save it again",
         ends="refused",
     ),
-    _case(
+    photo_case(
         "volume.tif",
         _REFUSED,
         None,
