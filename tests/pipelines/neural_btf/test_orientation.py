@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from assets_defs.neural_btf.photographs import ImageSettings
 from benchmarks.captures.orientations import Photographed, laid, photographed, scores_of
 from pipelines.light.directions import Pairs, all_pairs, hemisphere_table
 from pipelines.neural_btf import relief
@@ -135,3 +138,8 @@ def test_what_stands_out_moves_towards_the_viewer_s_far_side() -> None:
     picture = relief.moved(texture, distance, 0.0)
     assert picture[10, 6] == pytest.approx(1.0, abs=1e-3)
     assert picture[:, 7:].max() == 0
+
+
+def test_every_orientation_can_be_set() -> None:
+    offered = get_args(ImageSettings.model_fields["orientation"].annotation)
+    assert offered == ("auto", *ORIENTATIONS)
