@@ -2,9 +2,9 @@
 
 An asset's code version is the hash of its own function, of the functions and constants (numbers,
 texts, tuples of them) that it names in its module or in its system's package, and of every module
-of `pipelines` and of `storage.readers` that it imports, directly or through others; a shader that
-a module names counts like a module. The hash is over syntax trees without docstrings: a comment or
-a docstring changes no version.
+of `pipelines`, `storage.packages` and `storage.readers` that it imports, directly or through
+others; a shader that a module names counts like a module. The hash is over syntax trees without
+docstrings: a comment or a docstring changes no version.
 
 What a file says is worked out once and kept beside the bytecode, by the hash of the file's bytes:
 a process that finds nothing changed parses nothing.
@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 
 PROJECT = Path(__file__).resolve().parent.parent
 SHADERS = PROJECT / "pipelines" / "drawing" / "shaders"
-_HASHED_PACKAGES = ("pipelines", "storage.readers")
+_HASHED_PACKAGES = ("pipelines", "storage.packages", "storage.readers")
 _DIGITS = 16
 _KEPT = (
     Path(__file__).parent

@@ -15,6 +15,7 @@ from assets_defs.checks import Check, figure_before
 from assets_defs.dagster_metadata import dagster_metadata, picture_metadata
 from assets_defs.dagster_settings import config_class
 from assets_defs.ended_runs import tag_run
+from assets_defs.lineage import lineage
 from assets_defs.memory import give_back_freed_memory
 from assets_defs.partitions import keys_of_partition
 from assets_defs.picture_links import PictureLinks
@@ -119,7 +120,7 @@ def _materialise(
         records = {name: data.attrs[RECORD] for name, data in inputs.items()}
         fingerprint = source.fingerprint if source else None
         made_of = provenance(plan, settings, fingerprint, records)
-        offered = {
+        offered: dict[str, Any] = {
             "settings": settings,
             "source": source,
             "keys": keys,
@@ -128,6 +129,8 @@ def _materialise(
             **inputs,
         }
         named = inspect.signature(plan.function).parameters
+        if "lineage" in named:
+            offered["lineage"] = lineage(workspace.store, system.name, records)
         dataset, metadata = plan.function(**{name: offered[name] for name in named})
         notes = list(metadata.get(NOTES, ()))
         pictures = plan.pictures(dataset) if plan.pictures else {}

@@ -130,7 +130,8 @@ class System:
 
         It is called with ``settings``, then whichever it names of ``source`` (for an asset made
         from one), ``keys`` (the partition), ``progress`` (a function of the fraction done),
-        ``work`` (where state is kept that outlives a killed process) and its inputs, and returns
+        ``work`` (where state is kept that outlives a killed process), ``lineage`` (all versions
+        that its inputs were made of, with their verdicts) and its inputs, and returns
         ``(dataset, metadata)``.
         """
 

@@ -87,3 +87,9 @@ class Schema:
             f"{self.system}/{self.asset}: variable {name!r} {found}; expected {expected} "
             f"(schema {self.number})."
         )
+
+
+def package_schema(system: str, asset: str, meaning: str) -> Schema:
+    """The schema of an asset that holds a runtime package."""
+    file = Variable(("byte",), "uint8", "1", "The package, a .tsuya file (docs/packages.md)")
+    return Schema(system, asset, 1, meaning, {"file": file})
