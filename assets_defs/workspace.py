@@ -40,6 +40,11 @@ class Workspace:
         """Where commands write pictures for people: beside the data, not among them."""
         return self.root.absolute().parent / "pictures"
 
+    @property
+    def exports(self) -> Path:
+        """Where commands write what is for other programs."""
+        return self.root.absolute().parent / "exports"
+
     def inbox(self, system: str) -> Path:
         """Where people drop a system's files; what lies here is registered."""
         return self.root / "inbox" / system

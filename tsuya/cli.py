@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from pathlib import Path
 
 import click
 from click.shell_completion import CompletionItem
@@ -169,6 +170,30 @@ def pictures(key: str, ending: str) -> None:
     slot = parse_key(key)
     for path in write_pictures_as(workspace.store, slot, ending, workspace.pictures):
         click.echo(shown_path(path))
+
+
+@main.command()
+@click.argument("keys", metavar="[KEY]…", nargs=-1)
+@click.option("--to", "name", metavar="FORMAT", help="Left out: the formats there are.")
+@click.option("--out", type=click.Path(path_type=Path), help="Default: below exports/.")
+@says_errors
+def export(keys: tuple[str, ...], name: str | None, out: Path | None) -> None:
+    """Write KEY's package, or a .tsuya file, for another program, and print the path."""
+    from assets_defs.workspace import Workspace
+    from tsuya.console import shown_path
+    from tsuya.export_command import export as export_packages
+    from tsuya.export_command import format_lines
+    from tsuya.packages import find_package
+
+    workspace = Workspace.of_checkout()
+    if name is None:
+        system = find_package(workspace.store, keys[0]).system if keys else None
+        click.echo("\n".join(format_lines(system)))
+        return
+    for path, notes in export_packages(workspace, keys, name, out):
+        click.echo(shown_path(path))
+        for note in notes:
+            click.echo(f"  {note}")
 
 
 @main.command()

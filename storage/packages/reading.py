@@ -74,6 +74,13 @@ class Package:
         except (KeyError, TypeError):
             raise self._bad(f"parameter {name}", "missing", _GONE) from None
 
+    def whole(self) -> bytes:
+        """The bytes of the whole package."""
+        stream = self._archive.fp
+        assert stream is not None
+        stream.seek(0)
+        return stream.read()
+
     def content(self, name: str) -> bytes:
         """The bytes of a part's file. Raises BadInput where they are not what was written."""
         part = self._part(name)
