@@ -31,9 +31,7 @@ def test_good_packages_are_read(name: str, tmp_path: Path) -> None:
 def test_bad_packages_are_refused_in_a_sentence_and_little_memory(name: str) -> None:
     tracemalloc.start()
     with pytest.raises(BadInput) as refused:
-        package = read_package(BAD[name], name)
-        for part in package.parts:
-            package.value(part)
+        _values(read_package(BAD[name], name))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert str(refused.value).startswith(f"{name}: ")

@@ -54,7 +54,7 @@ def test_a_mesh_stands_upright_in_another_program(archive: zipfile.ZipFile) -> N
     x, y, z = mesh.vertices.T
     assert np.allclose(found.vertices, np.stack([x, z, -y], axis=1), atol=1e-6)
     assert np.array_equal(found.faces, mesh.triangles)
-    assert np.allclose(found.vertex_attributes["_LAYER"], mesh.attributes["LAYER"])
+    assert np.allclose(found.vertex_attributes["_LAYER"].ravel(), mesh.attributes["LAYER"])
 
 
 def test_texture_coordinates_are_those_of_a_reader_of_gltf(
