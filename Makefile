@@ -40,9 +40,10 @@ lint: setup      ## ruff and mypy
 	@$(VENV)/ruff format --check .
 	@$(VENV)/mypy
 
-docs: setup      ## docs/assets.md from the schemas; docs/inputs.md; docs/pictures/, made for the pages
+docs: setup      ## docs/assets.md from the schemas; docs/inputs.md, docs/packages.md; docs/pictures/, made for the pages
 	@$(VENV)/python -m docs.assets
 	@$(VENV)/python -m docs.inputs
+	@$(VENV)/python -m docs.packages
 	@$(VENV)/python -m docs.pictures
 	@$(VENV)/python -m docs.textured_scene
 
