@@ -21,6 +21,7 @@ from benchmarks.bad_input_files import (
     pictures,
     with_png_checksums,
 )
+from storage.packages.conformance import bad_packages
 
 
 def named_cases() -> list[Case]:
@@ -31,6 +32,7 @@ def named_cases() -> list[Case]:
         *_named_glbs(),
         *_named_drives(),
         *_named_specials(),
+        *(Case(name, "package", name, {name: data}) for name, data in bad_packages().items()),
         Case("commas", "profile", "p.csv", {"p.csv": b"," * 1_000_000 + b"\n"}),
         Case("comments", "profile", "p.csv", {"p.csv": b"#\n" * 600_000}),
         Case("token", "profile", "p.csv", {"p.csv": b"v,n\n" + b"1" * 900_000 + b",2\n"}),

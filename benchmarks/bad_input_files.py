@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from storage.packages.conformance import good_packages
+
 SPECIAL = ("folder", "pipe", "socket", "device")
 """What a case's file may be instead of bytes."""
 
@@ -65,6 +67,7 @@ def valid_cases() -> list[Case]:
         *_btf_cases(),
         drive("png"),
         drive("jpg"),
+        *(Case(name, "package", name, {name: data}) for name, data in good_packages().items()),
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import io
 import json
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.bad_input_files import Case, glb, with_png_checksums, zipped
+from storage.packages.conformance import rehashed
 
 _NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _WORDS = (
@@ -43,7 +45,7 @@ def mutated(case: Case, chance: random.Random) -> Case:
 
 def _mutation_of(name: str, chance: random.Random) -> Callable[[bytes, random.Random], bytes]:
     ending = name.rsplit(".", 1)[-1]
-    special = {"json": _json, "glb": _glb, "zip": _zip, "png": _png}.get(ending)
+    special = {"json": _json, "glb": _glb, "zip": _zip, "tsuya": _package, "png": _png}.get(ending)
     if special and chance.random() < 0.6:
         return special
     if ending in ("ply", "obj", "mtl", "csv", "json", "hdr") and chance.random() < 0.6:
@@ -156,16 +158,33 @@ def _glb(data: bytes, chance: random.Random) -> bytes:
 
 def _zip(data: bytes, chance: random.Random) -> bytes:
     """A member's content changed, and packed again."""
+    files = _members(data, chance)
+    return _flip(data, chance) if files is None else zipped(files)
+
+
+def _package(data: bytes, chance: random.Random) -> bytes:
+    """A part or `meta.json` changed, and packed again; often with hashes that belong to it."""
+    files = _members(data, chance)
+    if files is None:
+        return _flip(data, chance)
+    if chance.random() < 0.7:
+        with contextlib.suppress(Exception):  # meta.json is not what it was
+            return rehashed(files)
+    return zipped(files)
+
+
+def _members(data: bytes, chance: random.Random) -> dict[str, bytes] | None:
+    """The members of a zip, one of them changed; None where it is no zip, or has none."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             files = {name: archive.read(name) for name in archive.namelist()}
     except Exception:  # changed before
-        return _flip(data, chance)
-    name = chance.choice(sorted(files)) if files else ""
-    if not name:
-        return data
+        return None
+    if not any(files):
+        return None
+    name = chance.choice(sorted(files))
     files[name] = _mutation_of(name, chance)(files[name], chance)
-    return zipped(files)
+    return files
 
 
 def _png(data: bytes, chance: random.Random) -> bytes:

@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 from benchmarks.bad_input_cases import named_cases
 from benchmarks.bad_input_files import Case, valid_cases
 from benchmarks.bad_input_mutations import mutated
+from storage.packages import read_package
 from storage.readers import BadInput
 from storage.readers.btf import open_btf
 from storage.readers.drives import read_drive, read_frame
@@ -56,6 +57,12 @@ def _read_drive(path: Path) -> None:
     read_frame(read_drive(path), 0)
 
 
+def _read_package(path: Path) -> None:
+    package = read_package(path)
+    for name in package.parts:
+        package.value(name)
+
+
 READERS: dict[str, Callable[[Path], object]] = {
     "photograph": read_photograph,
     "environment": read_environment,
@@ -64,6 +71,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "profile": read_profile,
     "btf": _read_btf,
     "drive": _read_drive,
+    "package": _read_package,
     "script": lambda path: runpy.run_path(str(path)),  # of the fuzzer's own tests
 }
 

@@ -143,10 +143,10 @@ def bad_packages() -> dict[str, bytes]:
         ),
         "other_content.tsuya": _packed(files | {"float32.bin": b"\0" * len(files["float32.bin"])}),
         "short_content.tsuya": _packed(files | {"float32.bin": files["float32.bin"][:-4]}),
-        "no_png.tsuya": _rehashed(files | {"picture_3.png": b"\x89PNG\r\n\x1a\n" + b"\0" * 90}),
-        "no_glb.tsuya": _rehashed(files | {"mesh.glb": files["mesh.glb"][:60]}),
-        "no_ktx2.tsuya": _rehashed(files | {"halfs.ktx2": files["halfs.ktx2"][:120]}),
-        "huge_ktx2.tsuya": _rehashed(files | {"halfs.ktx2": _huge_ktx2(files["halfs.ktx2"])}),
+        "no_png.tsuya": rehashed(files | {"picture_3.png": b"\x89PNG\r\n\x1a\n" + b"\0" * 90}),
+        "no_glb.tsuya": rehashed(files | {"mesh.glb": files["mesh.glb"][:60]}),
+        "no_ktx2.tsuya": rehashed(files | {"halfs.ktx2": files["halfs.ktx2"][:120]}),
+        "huge_ktx2.tsuya": rehashed(files | {"halfs.ktx2": _huge_ktx2(files["halfs.ktx2"])}),
     }
     for share in (0.2, 0.5, 0.8, 0.99):
         bad[f"cut_at_{share:g}.tsuya"] = plain[: int(len(plain) * share)]
@@ -245,8 +245,11 @@ def _with_meta(package: bytes, change: Callable[[dict[str, Any]], dict[str, Any]
     return _packed(files | {META: json.dumps(change(json.loads(files[META]))).encode()})
 
 
-def _rehashed(files: Mapping[str, bytes]) -> bytes:
-    """A package whose hashes and sizes are those of its files, whatever these are."""
+def rehashed(files: Mapping[str, bytes]) -> bytes:
+    """A package whose hashes and sizes are those of its files, whatever these are.
+
+    Raises ValueError, KeyError, TypeError where `meta.json` does not tell the parts' files.
+    """
     meta = json.loads(files[META])
     for part in meta["parts"].values():
         content = files[part["file"]]

@@ -107,8 +107,9 @@ class Package:
 
         part = self._part(name, "picture")
         shape = self._shape(name, part)
+        content = self.content(name)
         try:
-            codes = png_codes(self.content(name), deep=part.get("dtype") == "uint16")
+            codes = png_codes(content, deep=part.get("dtype") == "uint16")
         except ValueError as error:
             raise self._bad(f"part {name}", str(error), _GONE) from None
         return self._as_said(name, part, codes, shape)
@@ -118,9 +119,9 @@ class Package:
         from storage.packages.reading_binary import ktx2_layers
 
         part = self._part(name, "textures")
-        shape = self._shape(name, part)
+        shape, content = self._shape(name, part), self.content(name)
         try:
-            layers = ktx2_layers(self.content(name))
+            layers = ktx2_layers(content)
         except ValueError as error:
             raise self._bad(f"part {name}", str(error), _GONE) from None
         return self._as_said(name, part, layers, shape)
@@ -130,8 +131,9 @@ class Package:
         from storage.packages.reading_binary import glb_arrays
 
         self._part(name, "mesh")
+        content = self.content(name)
         try:
-            arrays = glb_arrays(self.content(name))
+            arrays = glb_arrays(content)
         except ValueError as error:
             raise self._bad(f"part {name}", str(error), _GONE) from None
         uvs = arrays.pop("TEXCOORD_0", None)
@@ -167,7 +169,7 @@ class Package:
     def _type(self, name: str, part: dict[str, Any]) -> Any:
         import numpy as np
 
-        if part.get("dtype") not in _ARRAY_TYPES:
+        if str(part.get("dtype")) not in _ARRAY_TYPES:
             raise self._bad(f"dtype of {name}", str(part.get("dtype")), ", ".join(_ARRAY_TYPES))
         return np.dtype(part["dtype"]).newbyteorder("<")
 
@@ -234,7 +236,7 @@ def _check_files(archive: zipfile.ZipFile, meta: dict[str, Any], name: str) -> N
     stored = {entry.filename: entry for entry in archive.infolist()}
     for part_name, part in meta["parts"].items():
         field = f"part {part_name}"
-        if not isinstance(part, dict) or part.get("kind") not in _KINDS:
+        if not isinstance(part, dict) or str(part.get("kind")) not in _KINDS:
             raise BadInput(name, field, "of no known kind", ", ".join(sorted(_KINDS)))
         file = part.get("file")
         if not isinstance(file, str) or not _is_plain(file):
@@ -265,7 +267,8 @@ def _unpacked(archive: zipfile.ZipFile, file: str, name: str, largest: int) -> b
     try:
         with archive.open(entry) as stream:
             content = stream.read(entry.file_size + 1)
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError):
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError):
+        # RuntimeError: a password is wanted, a method is not known; ValueError: a name is no text
         raise BadInput(name, file, "damaged", _GONE) from None
     if len(content) != entry.file_size:
         raise BadInput(name, file, "longer than announced", _GONE)
