@@ -269,5 +269,16 @@ def ui(port: int | None) -> None:
     serve(port)
 
 
+@main.command()
+@click.argument("keys", nargs=-1, metavar="[KEY]...")
+@says_errors
+def view(keys: tuple[str, ...]) -> None:
+    """Show packages live in the browser: KEYs, .tsuya files, or all of the store."""
+    from assets_defs.workspace import Workspace
+    from tsuya.view_server import serve
+
+    serve(Workspace.of_checkout().store, keys)
+
+
 if __name__ == "__main__":
     main()

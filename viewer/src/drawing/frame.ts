@@ -56,7 +56,12 @@ const WHOLE = "in vec3 position;\nvoid main() { gl_Position = vec4(position.xy, 
 /** A renderer that leaves colours as they are. Throws where the browser has no WebGL2. */
 export function makeRenderer(canvas: HTMLCanvasElement): THREE.WebGLRenderer {
   THREE.ColorManagement.enabled = false;
-  const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance" });
+  const renderer = new THREE.WebGLRenderer({
+    canvas,
+    antialias: false,
+    premultipliedAlpha: false, // or a clear colour of coverage 0 would be black
+    powerPreference: "high-performance",
+  });
   renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
   renderer.toneMapping = THREE.NoToneMapping;
   renderer.autoClear = false;
