@@ -1,39 +1,123 @@
-/** The page: opens a package and shows it live. */
+/** The page: the gallery, or one package, as the address says. */
 
-import { makeRenderer } from "./drawing/frame";
-import { Live } from "./page/live";
-import { framed, turned, zoomed } from "./page/orbit";
-import { listedPackages, opened } from "./page/packages";
-import { viewerOf } from "./systems";
+import { Package } from "./package/package";
+import { read, type Address } from "./page/address";
+import { element } from "./page/elements";
+import { gallery } from "./page/gallery";
+import { listedPackages, opened, type Listed } from "./page/packages";
+import { partCanvas } from "./page/pictures";
+import { say, sentenceOf, sentencePage } from "./page/sentences";
+import { makeStage, type Stage } from "./page/stage";
+import { Viewing } from "./page/viewing";
 import { testHook } from "./test_hook";
 
-const ready = start();
-testHook.ready = ready;
-ready.catch((error: unknown) => (document.body.textContent = (error as Error).message));
+const ENDING = ".tsuya";
+
+let stage: Stage | undefined;
+let listed: Listed[] = [];
+let shown: Viewing | undefined;
+let asked = 0;
+
+/** Shows what the address says; a later call ends an earlier one. */
+async function show(): Promise<void> {
+  const number = ++asked;
+  const isLast = () => number === asked;
+  let address: Address = {};
+  try {
+    address = read(location.hash);
+    const key = address.key ?? (listed.length === 1 && location.hash !== "#gallery" ? listed[0].key : undefined);
+    if (shown && address.key === testHook.key) {
+      shown.show(address.view ?? {});
+      return;
+    }
+    leave();
+    if (key === undefined) await showGallery();
+    else await showPackage(key, address, isLast);
+  } catch (error) {
+    if (!isLast()) return;
+    leave();
+    const back = element("a", { href: "#gallery" }, "all packages");
+    document.body.replaceChildren(sentencePage(sentenceOf(error), listed.length > 1 ? back : undefined));
+    throw error;
+  }
+}
+
+async function showGallery(): Promise<void> {
+  document.title = "Tsuya";
+  if (!listed.length) throw new Error("There is no package here; drop a .tsuya file on the page.");
+  const { element: page, done } = gallery(listed);
+  document.body.replaceChildren(page);
+  await done;
+}
+
+async function showPackage(key: string, address: Address, isLast: () => boolean): Promise<void> {
+  const waiting = element("div", { class: "waiting", role: "status" }, "opening …");
+  document.body.replaceChildren(waiting);
+  stage ??= makeStage();
+  const pkg = await find(key);
+  document.title = `${pkg.meta.title} · Tsuya`;
+  const poster = await partCanvas(pkg, "poster", pkg.meta.title);
+  if (poster) waiting.append(poster);
+  const others = listed.map((each) => each.key).filter((other) => other !== key);
+  const viewing = await Viewing.open({ stage, pkg, others, open: find });
+  if (!isLast()) {
+    viewing.dispose();
+    return;
+  }
+  shown = viewing;
+  testHook.live = viewing.live;
+  testHook.key = key;
+  document.body.prepend(viewing.element);
+  if (address.view) viewing.show(address.view);
+  await viewing.firstFrame();
+  testHook.firstPicture ??= performance.now();
+  waiting.remove();
+  stage.canvas.focus({ preventScroll: true });
+}
+
+function find(key: string): Promise<Package> {
+  const found = listed.find((each) => each.key === key);
+  if (!found) throw new Error(`address: package is ${key}; expected one of the packages of this page.`);
+  return opened(found);
+}
+
+function leave(): void {
+  shown?.dispose();
+  shown = testHook.live = testHook.key = undefined;
+}
+
+async function dropped(file: File): Promise<void> {
+  if (file.name.toLowerCase().endsWith(ENDING)) {
+    const content = new Uint8Array(await file.arrayBuffer());
+    listed = [...listed.filter(({ key }) => key !== file.name), { key: file.name, content }];
+    leave();
+    location.hash = new URLSearchParams({ package: file.name }).toString();
+  } else if (!shown?.drop(file)) {
+    say(`${file.name} is of no kind that this page takes; expected a ${ENDING} file.`);
+  }
+}
 
 async function start(): Promise<void> {
-  const canvas = document.body.appendChild(document.createElement("canvas"));
-  canvas.className = "live";
-  const renderer = makeRenderer(canvas);
-  const pkg = await opened((await listedPackages())[0]);
-  const viewer = viewerOf(pkg.meta.system);
-  if (!viewer) throw new Error(`${pkg.name}: there is no live view of ${pkg.meta.system}.`);
-  let live: Live | undefined;
-  const view = await viewer.make(pkg, { renderer, requestDraw: () => live?.change() });
-  const camera = view.home ?? pkg.meta.views[0]?.camera ?? framed(view.bounds, canvas.clientWidth / canvas.clientHeight);
-  live = new Live(renderer, view, camera);
-  testHook.live = live;
-  await new Promise<void>((resolve, reject) => {
-    live.onFrame = resolve;
-    live.onError = reject;
-  });
-  canvas.onpointermove = (event) => {
-    if (!event.buttons) return;
-    live.camera = turned(live.camera, -event.movementX / 3, event.movementY / 3);
-    live.change();
-  };
-  canvas.onwheel = (event) => {
-    live.camera = zoomed(live.camera, Math.exp(event.deltaY / 800), view.bounds);
-    live.change();
-  };
+  document.body.replaceChildren(element("div", { class: "waiting", role: "status" }, "opening …"));
+  try {
+    listed = await listedPackages();
+  } catch (error) {
+    document.body.replaceChildren(sentencePage(sentenceOf(error)));
+    throw error;
+  }
+  await show();
 }
+
+/** What is being shown; what went wrong stands in the page. */
+function note(showing: Promise<void>): void {
+  testHook.ready = showing;
+  showing.catch(() => {});
+}
+
+window.addEventListener("hashchange", () => note(show()));
+window.addEventListener("dragover", (event) => event.preventDefault());
+window.addEventListener("drop", (event) => {
+  event.preventDefault();
+  for (const file of event.dataTransfer?.files ?? []) void dropped(file);
+});
+note(start());

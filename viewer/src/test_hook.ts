@@ -9,6 +9,10 @@ export const testHook = {
   /** Settled when the page has drawn its first frame, or the gallery. */
   ready: undefined as Promise<void> | undefined,
   live: undefined as Live | undefined,
+  /** The package that is shown. */
+  key: undefined as string | undefined,
+  /** Milliseconds from the opening of the page to the first frame of a package. */
+  firstPicture: undefined as number | undefined,
 
   /** Camera and state. */
   view(): View {

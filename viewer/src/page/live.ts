@@ -40,6 +40,7 @@ export class Live {
   private generation = 0;
   private awake: (() => void) | undefined;
   private ended = false;
+  private warm = false;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -125,14 +126,14 @@ export class Live {
       if (this.ended) return;
       drawn = this.generation;
       try {
-        await this.drawMoving(drawn);
+        await this.drawMoving();
       } catch (error) {
         this.onError(error);
       }
     }
   }
 
-  private async drawMoving(generation: number): Promise<void> {
+  private async drawMoving(): Promise<void> {
     for (const { view } of this.panes) {
       const loading = view.update?.(this.camera);
       loading?.catch((error: unknown) => this.onError(error));
@@ -147,7 +148,11 @@ export class Live {
     await this.finished();
     this.frameTime = performance.now() - begun;
     this.onFrame();
-    if (generation === 0) return; // the first compiles shaders
+    if (!this.warm) { // the first compiles shaders: its time says nothing
+      this.warm = true;
+      this.change();
+      return;
+    }
     const wanted = this.scale * Math.sqrt(MOVING / Math.max(this.frameTime, 1));
     if (this.frameTime > MOVING * 1.3 || wanted > this.scale * 1.2) {
       this.scale = Math.min(1, Math.max(LOWEST_SCALE, wanted));

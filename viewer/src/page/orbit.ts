@@ -60,3 +60,21 @@ export function framed(bounds: Bounds, aspect: number): Camera {
   };
   return turned(start, 25, 20);
 }
+
+/** A camera made for a wide picture, gone back until a narrow one has all of `bounds`. */
+export function fitted(camera: Camera, bounds: Bounds, aspect: number): Camera {
+  if (aspect >= 1) return camera;
+  if (camera.height !== null) return { ...camera, height: Math.max(camera.height, (2 * bounds.radius) / aspect) };
+  const distance = new Vector3(...camera.position).distanceTo(new Vector3(...camera.target));
+  const half = Math.atan(Math.tan(MathUtils.degToRad(camera.view_angle / 2)) * aspect);
+  const needed = Math.min(bounds.radius / Math.sin(half), distance / aspect);
+  return needed > distance ? zoomed(camera, needed / distance, bounds) : camera;
+}
+
+/** Whether something read from an address is a camera. */
+export function isCamera(given: Camera): boolean {
+  const vectors = [given.position, given.target, given.up];
+  const isVector = (value: unknown) => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
+  const hasLens = Number.isFinite(given.view_angle) && given.view_angle > 0 && given.view_angle < 180;
+  return vectors.every(isVector) && hasLens && (given.height === null || given.height > 0);
+}
