@@ -29,6 +29,8 @@ export interface Picture<T extends Values = Values> {
   data: T;
 }
 
+/** The first bytes of a PNG. */
+const PNG = 0x89504e47;
 const LARGEST_META = 16 << 20;
 const TYPES: Record<string, { new (buffer: ArrayBuffer): Values; BYTES_PER_ELEMENT: number }> = {
   int8: Int8Array,
@@ -98,9 +100,14 @@ export class Package {
     return content;
   }
 
-  /** The shape of an array part. */
+  /** The shape of a part. Throws BadPackage for what is no shape, or larger than any part. */
   shape(name: string): number[] {
-    return this.part(name).shape ?? [];
+    const { shape } = this.part(name);
+    const isShape = Array.isArray(shape) && shape.every((side) => Number.isInteger(side) && side >= 0);
+    if (!isShape || product(shape) > LARGEST_PART) {
+      throw this.bad(`shape of ${name}`, JSON.stringify(shape) ?? "missing", "whole numbers");
+    }
+    return shape;
   }
 
   /** An array part, C order; float16 as 16-bit codes, `floats` decodes them. */
@@ -108,7 +115,7 @@ export class Package {
     const part = this.of(name, "array");
     const type = TYPES[part.dtype ?? ""];
     if (!type) throw this.bad(`dtype of ${name}`, `${part.dtype}`, Object.keys(TYPES).join(", "));
-    const count = (part.shape ?? []).reduce((product, side) => product * side, 1);
+    const count = product(this.shape(name));
     const content = await this.content(name);
     if (content.length !== count * type.BYTES_PER_ELEMENT) {
       throw this.bad(`part ${name}`, `${content.length} bytes`, `${part.dtype} (${part.shape})`);
@@ -125,7 +132,14 @@ export class Package {
   /** A picture part: the raw codes. */
   async picture(name: string): Promise<Picture<Uint8Array | Uint16Array>> {
     const part = this.of(name, "picture");
+    const shape = this.shape(name);
     const content = await this.content(name);
+    // What it announces is looked at before it is decoded, which takes so much memory.
+    const head = new DataView(content.buffer, content.byteOffset, content.byteLength);
+    if (content.length < 24 || head.getUint32(0) !== PNG) throw this.bad(`part ${name}`, "no PNG");
+    if (head.getUint32(16) !== shape[1] || head.getUint32(20) !== shape[0]) {
+      throw this.bad(`part ${name}`, "a PNG of another size", `(${shape}), as meta.json says`);
+    }
     let png: ReturnType<typeof decode>;
     try {
       png = decode(content);
@@ -144,6 +158,7 @@ export class Package {
   /** A textures part (layer, y, x, channel). */
   async textures(name: string): Promise<Layers> {
     const part = this.of(name, "textures");
+    this.shape(name);
     const content = await this.content(name);
     let layers: Layers;
     try {
@@ -189,6 +204,10 @@ export function widened(halfs: Uint16Array): Float32Array {
     if (exponent === 31) return fraction ? NaN : sign * Infinity;
     return sign * (exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : 2 ** -14 * (fraction / 1024));
   });
+}
+
+function product(sides: number[]): number {
+  return sides.reduce((so, side) => so * side, 1);
 }
 
 async function hash(content: Uint8Array<ArrayBuffer>): Promise<string> {

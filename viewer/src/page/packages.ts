@@ -12,12 +12,17 @@ export interface Listed {
   content?: Uint8Array;
 }
 
+const FROM_DISK =
+  "This page was opened from disk, where browsers let it read no other file; expected a web server, " +
+  "or the one file that `tsuya export KEY --to html` writes.";
+
 /** All packages of the page. Throws an Error where the list cannot be read. */
 export async function listedPackages(): Promise<Listed[]> {
   const inside = document.querySelectorAll<HTMLScriptElement>('script[type="application/vnd.tsuya;base64"]');
   if (inside.length) {
     return [...inside].map((element) => ({ key: element.dataset.key ?? "package", content: decoded(element) }));
   }
+  if (location.protocol === "file:") throw new Error(FROM_DISK);
   const answer = await fetch("packages.json", { cache: "no-store" });
   if (!answer.ok) throw new Error(`packages.json: answered with ${answer.status}; expected the list of packages.`);
   const list = (await answer.json()) as { packages: Listed[] };
