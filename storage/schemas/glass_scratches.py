@@ -168,6 +168,14 @@ GLASS_FRAMES = Schema(
     },
 )
 
+GLASS_PACKAGE = Schema(
+    _SYSTEM,
+    "glass_package",
+    1,
+    "The scratched glass as a runtime package (docs/packages.md).",
+    {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
+)
+
 SCHEMAS = (
     SCRATCH_PROFILE,
     SCRATCH_TABLE_2D,
@@ -175,4 +183,5 @@ SCHEMAS = (
     SCRATCH_LAYERS,
     GLASS_OBJECT,
     GLASS_FRAMES,
+    GLASS_PACKAGE,
 )

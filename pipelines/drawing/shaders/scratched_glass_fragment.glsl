@@ -1,9 +1,13 @@
 // Scratched glass in its environment: one reflection and one refraction of it, and LAYERS of
-// scratches, the directions of which are ANGLES, lit by LIGHTS lights.
+// scratches, the directions of which are ANGLES, lit by LIGHTS lights. All directions are those of
+// the glass; TO_SKY turns them into the environment's. Beside the environment there is a lamp, of
+// which LIGHTS has a light. COVERED_A and COVERED_B multiply the layers' coverage, STRENGTH what
+// light meets of it.
 
 #include "pi.glsl"
 #include "box_projection.glsl"
 #include "equirectangular.glsl"
+#include "round_lamp.glsl"
 #include "schlick.glsl"
 #include "scratch_table.glsl"
 
@@ -20,7 +24,9 @@ in vec3 placeOut;
 const float angles[LAYERS] = float[LAYERS](ANGLES);
 
 vec3 skyAlong(vec3 direction) {
-  return textureLod(sky, equirectangularPlace(direction), 0.0).rgb;
+  vec2 place = equirectangularPlace(mat3(TO_SKY) * direction);
+  return textureLod(sky, place, 0.0).rgb
+       + roundLamp(direction, vec3(LAMP), vec2(LAMP_EDGE), vec3(LAMP_RADIANCE));
 }
 
 // What smooth glass shows: light from behind is bent half as much as by one surface, for it leaves
@@ -47,9 +53,10 @@ vec3 surfaceColour() {
   for (int axis = 0; axis < 3; axis++) {
     if (share[axis] < 0.01) continue;
     vec2 uv = boxPlace(placeOut, axis, facingOut[axis] > 0.0, TILE);
-    vec4 here[2] = vec4[2](texture(coverageA, uv), texture(coverageB, uv));
+    vec4 here[2] = vec4[2](min(texture(coverageA, uv) * vec4(COVERED_A), 1.0),
+                           min(texture(coverageB, uv) * vec4(COVERED_B), 1.0));
     for (int layer = 0; layer < LAYERS; layer++) {
-      float part = here[layer / 4][layer % 4] * share[axis];
+      float part = here[layer / 4][layer % 4] * share[axis] * STRENGTH;
       if (part < 0.002) continue;
       vec3 along = vec3(0.0);
       along[(axis + 1) % 3] = cos(angles[layer]);

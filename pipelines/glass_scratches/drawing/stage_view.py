@@ -7,14 +7,17 @@ what is seen through the glass is not what the inside of the glass does.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.colour import luminance
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Camera, Stage, surface, texture
 from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+from pipelines.light.environment_maps import solid_angles
 from pipelines.light.environment_sampling import EnvironmentSampler, sample_directions
 
 if TYPE_CHECKING:
@@ -23,6 +26,18 @@ if TYPE_CHECKING:
 MOST_LAYERS = 8
 """Two textures of four channels."""
 LIGHTS = 64
+LAMP_EDGE = (math.cos(math.radians(5.0)), math.cos(math.radians(3.0)))
+"""Cosines to the middle of a lamp between which its radiance rises from nothing to all."""
+LAMP_COLOUR = (1.0, 0.93, 0.8)
+
+
+class Lamp(NamedTuple):
+    """A round lamp far away, beside the environment."""
+
+    towards: tuple[float, float, float]
+    """Unit vector from the glass to its middle."""
+    strength: float
+    """Its irradiance, where it falls straight, over the mean that the environment gives."""
 
 
 class ScratchedActor:
@@ -47,14 +62,8 @@ class ScratchedActor:
             raise ValueError(
                 f"there are {len(coverage)} layers; expected at most {MOST_LAYERS} on the stage."
             )
-        corners = np.asarray(solid.vertices)[solid.triangles]
-        facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
-        self._corners = corners.reshape(-1, 3)
-        self._attributes: dict[str, NDArray[Any]] = {
-            "shading": np.asarray(solid.corner_normals).reshape(-1, 3),
-            "facing": np.repeat(facing, 3, axis=0),
-        }
+        self._corners, shading, facing = corners_apart(solid)
+        self._attributes: dict[str, NDArray[Any]] = {"shading": shading, "facing": facing}
         filled = np.zeros((MOST_LAYERS, *coverage.shape[1:]), np.float32)
         filled[: len(coverage)] = coverage
         packed = np.moveaxis(filled[:, ::-1], 0, -1)  # a texture's row 0 is its top
@@ -69,9 +78,14 @@ class ScratchedActor:
         self._angles = [round(float(angle), 7) for angle in angles]
         self._index, self._tile = index, tile
 
-    def actor(self, environment: EnvironmentSampler, camera: Camera) -> Any:
-        """The actor as this camera sees it in this environment."""
-        lights, through = _lights(environment)
+    def actor(
+        self, environment: EnvironmentSampler, camera: Camera, lamp: Lamp | None = None
+    ) -> Any:
+        """The actor as this camera sees it in this environment, with a lamp beside it."""
+        lights, through = environment_lights(environment)
+        glow = lamp_radiance(lamp, environment) if lamp else np.zeros(3)
+        if lamp:
+            lights = np.concatenate([lights, _lamp_light(lamp, glow)], axis=1)
         position = np.asarray(camera.position)
         if camera.height is not None:  # far enough away to be parallel
             position = np.asarray(camera.target) + 1e4 * (position - np.asarray(camera.target))
@@ -81,7 +95,9 @@ class ScratchedActor:
             for name, values in self._maps.items()
         }
         textures["sky"] = texture(image, wrap="clamp")
-        textures["lights"] = texture(lights, wrap="clamp", interpolate=False)
+        # A texture's rows count from the bottom: the picture's last row is row 0 there.
+        rows = np.ascontiguousarray(lights[::-1])
+        textures["lights"] = texture(rows, wrap="clamp", interpolate=False)
         return surface(
             self._corners,
             np.arange(len(self._corners)).reshape(-1, 3),
@@ -92,12 +108,19 @@ class ScratchedActor:
                 "scratched_glass_fragment.glsl",
                 LAYERS=len(self._angles),
                 ANGLES=self._angles,
-                LIGHTS=LIGHTS,
+                LIGHTS=lights.shape[1],
                 EYE=[round(float(value), 7) for value in position],
                 RELATIVE_INDEX=1.0 / self._index,
                 BASE_REFLECTANCE=((self._index - 1) / (self._index + 1)) ** 2,
                 TILE=float(self._tile),
                 THROUGH=through,
+                TO_SKY=np.eye(3).ravel().tolist(),
+                LAMP=list(lamp.towards if lamp else (0.0, 0.0, 1.0)),
+                LAMP_EDGE=list(LAMP_EDGE),
+                LAMP_RADIANCE=glow.tolist(),
+                COVERED_A=[1.0] * 4,
+                COVERED_B=[1.0] * 4,
+                STRENGTH=1.0,
             ),
             lit=False,
         )
@@ -111,25 +134,60 @@ def draw_scratched(
     width: int,
     height: int,
     supersampling: int,
+    lamp: Lamp | None = None,
 ) -> NDArray[np.float32]:
-    """Linear radiance and coverage (height, width, 4) of the object in its environment."""
+    """Linear radiance and coverage (height, width, 4) of the object in its environment.
+
+    A ``lamp`` shows on and in the glass, not behind it.
+    """
     with Stage(
         width, height, background=np.asarray(environment.radiance), supersampling=supersampling
     ) as stage:
-        stage.add(actor.actor(environment, camera))
+        stage.add(actor.actor(environment, camera, lamp))
         stage.look(camera)
         return stage.radiance()
 
 
-def _lights(environment: EnvironmentSampler) -> tuple[NDArray[np.float32], float]:
-    """Lights drawn from the environment as a picture of two rows (power; direction), row 0 on top,
-    and the mean radiance all around, which stands for what comes through the glass."""
+def corners_apart(
+    solid: Solid,
+) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float64]]:
+    """Corners of the triangles, each for itself, (3 F, 3): places, shading normals, and normals of
+    their triangles."""
+    corners = np.asarray(solid.vertices)[solid.triangles]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    shading = np.asarray(solid.corner_normals).reshape(-1, 3)
+    return corners.reshape(-1, 3), shading, np.repeat(facing, 3, axis=0)
+
+
+def environment_lights(environment: EnvironmentSampler) -> tuple[NDArray[np.float32], float]:
+    """Lights drawn from the environment, (2, LIGHTS, 3): their power, radiance times steradians,
+    and unit vectors to them; and the mean radiance all around, which stands for what comes through
+    the glass."""
     from pipelines.light.environment_lookup import radiance_from_directions
 
     index = np.arange(LIGHTS)
     u = np.stack([(index + 0.5) / LIGHTS, (index * 0.6180339887498949) % 1.0], axis=-1)
     towards, density = sample_directions(environment, u)
     power = radiance_from_directions(environment.radiance, towards) / (density * LIGHTS)[:, None]
-    # texelFetch counts rows from the bottom of the texture: row 1 of the picture is row 0 there.
-    rows = np.stack([towards, power]).astype(np.float32)
-    return np.ascontiguousarray(rows), float(power.mean(axis=1).sum() / (4 * np.pi))
+    through = float(power.mean(axis=1).sum() / (4 * np.pi))
+    return np.stack([power, towards]).astype(np.float32), through
+
+
+def lamp_radiance(lamp: Lamp, environment: EnvironmentSampler) -> NDArray[np.float64]:
+    """Radiance (3,) of a lamp in an environment."""
+    bright = luminance(environment.radiance.astype(np.float64))
+    mean = float(np.sum(bright * solid_angles(len(bright))[:, None])) / (4 * np.pi)
+    colour = np.array(LAMP_COLOUR)
+    return lamp.strength * np.pi * mean / _lamp_steradians() * colour / luminance(colour)
+
+
+def _lamp_light(lamp: Lamp, radiance: NDArray[np.float64]) -> NDArray[np.float32]:
+    """A lamp as one more light, (2, 1, 3)."""
+    light = np.stack([radiance * _lamp_steradians(), np.array(lamp.towards)])
+    return light[:, None].astype(np.float32)
+
+
+def _lamp_steradians() -> float:
+    """Those of a lamp of even radiance that gives the same light."""
+    return np.pi * (2.0 - LAMP_EDGE[0] - LAMP_EDGE[1])

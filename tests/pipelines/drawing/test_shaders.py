@@ -60,6 +60,13 @@ _GLASS: dict[str, Any] = {
     "BASE_REFLECTANCE": 0.04,
     "TILE": 0.35,
     "THROUGH": 0.7,
+    "TO_SKY": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+    "LAMP": [0.0, 0.0, 1.0],
+    "LAMP_EDGE": [0.996, 0.998],
+    "LAMP_RADIANCE": [3.0, 2.0, 1.0],
+    "COVERED_A": [1.0, 1.0, 0.0, 1.0],
+    "COVERED_B": [1.0, 1.0, 1.0, 1.0],
+    "STRENGTH": 0.5,
 }
 _LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0}
 _GLOSSY: dict[str, Any] = {

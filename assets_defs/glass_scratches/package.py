@@ -1,0 +1,317 @@
+"""The scratched glass for programs that know nothing of the store: `glass_package`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+from pydantic import Field
+
+from assets_defs.glass_scratches.declaration import ENVIRONMENTS, OBJECTS, SCRATCHES, SETTINGS
+from assets_defs.glass_scratches.frames import FrameSettings, environment
+from assets_defs.packages import PackageSettings, package_dataset, read_back_check
+from assets_defs.settings import Preset
+from assets_defs.system import Result
+from storage.schemas import glass_scratches as schemas
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from pipelines.geometry.solids import Solid
+    from pipelines.glass_scratches.drawing.live_parts import ReferenceView
+    from pipelines.glass_scratches.scratched_glass import ScratchMaterial
+    from storage.packages import Contents, Figure, View
+
+_OTHERS = ("lamps", "sky")
+"""Environments that each package has beside its own."""
+_OWN = "own"
+"""What a user's environment is called in the package."""
+_BUILT_IN = "Apache-2.0 (made by Tsuya)"
+
+
+class GlassPackageSettings(PackageSettings):
+    """What the package holds beside the glass."""
+
+    environment_rows: int = Field(
+        512, ge=8, le=2048, description="Most rows of its environments, texels"
+    )
+    view_size: int = Field(
+        320, ge=32, le=1024, description="Height and width of its reference pictures, pixels"
+    )
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"environment_rows": 64, "view_size": 96},
+    }
+
+
+def _expected(version: StoredVersion) -> dict[str, Any]:
+    """Parts as the datasets have them, by NumPy alone."""
+    import numpy as np
+
+    table, along = version.input("scratch_table_2d"), version.input("scratch_table")
+    layers, frames = version.input("scratch_layers"), version.input("glass_frames")
+    rows = [along["factor"].values[0], along["gamma"].values]
+    return {
+        "table": table["rho"].values.astype(np.float16),
+        "leaning": np.array(rows, np.float32),
+        "angles": layers["angle"].values,
+        "coverage": np.floor(255.0 * layers["coverage"].values + 0.5).astype(np.uint8)[..., None],
+        "object": _expected_mesh(version.input("glass_object")),
+        "poster": frames["frames"].values[0],
+    }
+
+
+def _expected_mesh(glass_object: xr.Dataset) -> Any:
+    import numpy as np
+
+    from storage.packages import Mesh
+
+    corners = glass_object["vertices"].values[glass_object["triangles"].values]
+    first, second, third = np.moveaxis(corners, 1, 0)
+    facing = np.cross(second - first, third - first)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    return Mesh(
+        corners.reshape(-1, 3).astype(np.float32),
+        np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3),
+        glass_object["corner_normals"].values.reshape(-1, 3),
+        attributes={"FACING": facing.repeat(3, axis=0).astype(np.float32)},
+    )
+
+
+@SCRATCHES.asset(
+    schemas.GLASS_PACKAGE,
+    by=("setting", "object"),
+    settings=GlassPackageSettings,
+    inputs=(
+        "scratch_profile",
+        "scratch_table_2d",
+        "scratch_table",
+        "scratch_layers",
+        "glass_object",
+        "glass_frames",
+    ),
+    kinds=frozenset({"zarr", "pyvista"}),
+    checks=(read_back_check(_expected),),
+)
+def glass_package(
+    *,
+    settings: GlassPackageSettings,
+    lineage: Sequence[Mapping[str, Any]],
+    scratch_profile: xr.Dataset,
+    scratch_table_2d: xr.Dataset,
+    scratch_table: xr.Dataset,
+    scratch_layers: xr.Dataset,
+    glass_object: xr.Dataset,
+    glass_frames: xr.Dataset,
+) -> Result:
+    """Pack the table, the layers, the object and its light, and draw the reference views."""
+    from assets_defs.glass_scratches.datasets import material_of, solid_of
+    from storage.packages import write_package
+    from storage.packages.glass_scratches import PACKAGE
+
+    light = _light_of(settings, lineage, float(glass_frames["exposure"]))
+    glass = _Glass(
+        solid_of(glass_object), material_of(scratch_table_2d, scratch_table, scratch_layers), light
+    )
+    views = glass.views(settings.view_size)
+    values = glass.parts() | {f"reference_{view.name}": view.frame for view in views}
+    values |= _pictures(scratch_profile, glass_frames)
+    names = (scratch_profile.attrs["name"], glass_object.attrs["name"], light.source)
+    figures = _figures(scratch_table_2d, scratch_table, scratch_layers, glass_frames)
+    contents = glass.contents(names, values, views, figures, lineage, settings.licence)
+    content = write_package(PACKAGE, contents)
+    return package_dataset(content), {"bytes": len(content)}
+
+
+# ---- light -----------------------------------------------------------------------------------
+
+
+class _Light(NamedTuple):
+    """Environments of a package, in halfs, by name; first that of the reference pictures."""
+
+    environments: Mapping[str, NDArray[np.float16]]
+    source: str
+    """The first one's name, or its file's."""
+    tile: float
+
+
+def _light_of(
+    settings: GlassPackageSettings, lineage: Sequence[Mapping[str, Any]], exposure: float
+) -> _Light:
+    """The frames' environment, made or read again, and the built-in ones.
+
+    Raises ValueError where a user's file is not what it was, BadInput where it is gone.
+    """
+    from pipelines.glass_scratches.drawing.frames import environment_exposure
+    from pipelines.glass_scratches.drawing.live_parts import half_radiance
+    from pipelines.light.environment_sampling import make_environment_sampler
+
+    chosen = next(step["settings"] for step in lineage if step["asset"] == "glass_frames")
+    shown = FrameSettings(**chosen)
+    radiance = environment(shown).radiance
+    if not math.isclose(environment_exposure(make_environment_sampler(radiance)), exposure):
+        raise ValueError(
+            f"{shown.environment} has changed since glass_frames was made; "
+            "expected the same file: run glass_frames again."
+        )
+    built_in = shown.environment in ENVIRONMENTS
+    name = shown.environment if built_in else _OWN
+    others = {
+        other: environment(FrameSettings(environment=other)).radiance
+        for other in _OTHERS
+        if other != name
+    }
+    halfs = {
+        key: half_radiance(each, settings.environment_rows)
+        for key, each in {name: radiance, **others}.items()
+    }
+    return _Light(halfs, name if built_in else Path(shown.environment).name, shown.tile)
+
+
+# ---- what is packed --------------------------------------------------------------------------
+
+
+class _Glass:
+    """A scratched solid and its light, as parts and views."""
+
+    def __init__(self, solid: Solid, material: ScratchMaterial, light: _Light) -> None:
+        import numpy as np
+
+        from pipelines.light.environment_sampling import make_environment_sampler
+
+        self.solid, self.material, self.light = solid, material, light
+        self.name = next(iter(light.environments))
+        self.samplers = {
+            name: make_environment_sampler(halfs.astype(np.float32))
+            for name, halfs in light.environments.items()
+        }
+
+    def parts(self) -> dict[str, Any]:
+        """Values by the names of parts."""
+        import numpy as np
+
+        from pipelines.glass_scratches.drawing import live_parts, stage_view
+        from storage.packages import Mesh
+
+        places, shading, facing = stage_view.corners_apart(self.solid)
+        corners = np.arange(len(places), dtype=np.uint32).reshape(-1, 3)
+        attributes = {"FACING": facing.astype(np.float32)}
+        values: dict[str, Any] = {
+            "table": self.material.rho.astype(np.float16),
+            "leaning": live_parts.leaning_rows(self.material.fresnel),
+            "angles": self.material.layers.angle,
+            "coverage": live_parts.coverage_codes(self.material.coverage)[..., None],
+            "object": Mesh(places.astype(np.float32), corners, shading, attributes=attributes),
+        }
+        for name, halfs in self.light.environments.items():
+            values[f"environment_{name}"] = halfs.view(np.uint16)
+            values[f"lights_{name}"] = stage_view.environment_lights(self.samplers[name])[0]
+        return values
+
+    def views(self, size: int) -> tuple[ReferenceView, ...]:
+        """The reference views, drawn."""
+        from pipelines.glass_scratches.drawing.live_parts import reference_views
+        from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
+
+        actor = ScratchedActor(
+            self.solid,
+            self.material.coverage,
+            self.material.layers.angle,
+            self.material.rho,
+            self.material.fresnel,
+            index=self.material.refractive_index,
+            tile=self.light.tile,
+        )
+        return reference_views(self.solid, actor, self.samplers[self.name], size)
+
+    def parameters(self) -> dict[str, Any]:
+        """Values by the names of parameters."""
+        from pipelines.glass_scratches.drawing import frames, stage_view
+
+        return {
+            "refractive_index": self.material.refractive_index,
+            "roughness": self.material.roughness,
+            "tile": self.light.tile,
+            "environment": self.name,
+            "exposure": frames.environment_exposure(self.samplers[self.name]),
+            "lamp_edge": list(stage_view.LAMP_EDGE),
+            "lamp_colour": list(stage_view.LAMP_COLOUR),
+        }
+
+    def contents(
+        self,
+        names: Sequence[str],
+        values: Mapping[str, Any],
+        views: Sequence[ReferenceView],
+        figures: Sequence[Figure],
+        lineage: Sequence[Mapping[str, Any]],
+        licence: str,
+    ) -> Contents:
+        """All of the package; ``names`` of profile, object and environment."""
+        from storage.packages import Contents, Source
+
+        built_in = {*SETTINGS, *OBJECTS, *ENVIRONMENTS}
+        sources = [
+            Source(name, _BUILT_IN if name in built_in else licence or "not stated")
+            for name in names
+        ]
+        shown = [self._view(view) for view in views]
+        title = f"{names[0]} on {names[1]}"
+        return Contents(title, sources, values, self.parameters(), shown, figures, lineage)
+
+    def _view(self, view: ReferenceView) -> View:
+        from storage.packages import View
+
+        size = len(view.frame)
+        state = {
+            "environment": self.name,
+            "turn": 0.0,
+            "tilt": 0.0,
+            "swing": 0.0,
+            "coverage": 1.0,
+            "strength": 1.0,
+            "tile": self.light.tile,
+            "lamp": view.lamp.strength if view.lamp else 0.0,
+            "light": list(view.lamp.towards if view.lamp else (0.0, 0.0, 1.0)),
+            **{f"layer_{n + 1}": True for n in range(len(self.material.coverage))},
+        }
+        return View(view.name, f"reference_{view.name}", size, size, 2, asdict(view.camera), state)
+
+
+def _pictures(scratch_profile: xr.Dataset, glass_frames: xr.Dataset) -> dict[str, Any]:
+    from pipelines.glass_scratches.drawing.pictures import profile_picture
+
+    return {
+        "poster": glass_frames["frames"].values[0],
+        "input": profile_picture(scratch_profile["points"].values),
+    }
+
+
+def _figures(
+    scratch_table_2d: xr.Dataset,
+    scratch_table: xr.Dataset,
+    scratch_layers: xr.Dataset,
+    glass_frames: xr.Dataset,
+) -> list[Figure]:
+    """Figures of the glass, the paper's beside them."""
+    from pipelines.glass_scratches.figures import table_furnace_error
+    from storage.packages import Figure, PaperFigure
+
+    rho = scratch_table_2d["rho"].values
+    furnace = table_furnace_error(rho, scratch_table_2d["absorbed"].values)
+    middle = float(scratch_table["gamma"].values[len(rho) // 2])
+    index = float(scratch_table["index"])
+    return [
+        Figure("Bins of each angle", len(rho), "1", PaperFigure(256, "section 3.1, M")),
+        Figure("Refractive index", index, "1", PaperFigure(1.5, "section 3.1, n")),
+        Figure("Gamma, straight on", middle, "1", PaperFigure(8.5476, "by Eq. 2 to 4")),
+        Figure("Light that a table of white walls loses", furnace),
+        Figure("Coverage of a layer, mean", float(scratch_layers["coverage"].values.mean())),
+        Figure("Standard error of the traced picture", float(glass_frames["error"].values.mean())),
+    ]

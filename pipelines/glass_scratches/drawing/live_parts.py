@@ -1,0 +1,87 @@
+"""Scratched glass as a live picture needs it: halfs, 8-bit coverage, environments small enough, and
+frames of the stage to compare it with."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.drawing.stage import Camera
+from pipelines.geometry.solids import Solid
+from pipelines.glass_scratches.drawing.frames import exposed, object_cameras
+from pipelines.glass_scratches.drawing.stage_view import Lamp, ScratchedActor, draw_scratched
+from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+from pipelines.light.environment_maps import Radiance, check_environment
+from pipelines.light.environment_sampling import EnvironmentSampler
+
+LARGEST_HALF = float(np.finfo(np.float16).max)
+_LAMP_AT = (-0.48, -0.64, 0.6)
+"""Behind the camera's shoulder: a lamp is not seen behind the glass, only on it and in it."""
+
+
+def half_radiance(radiance: Radiance, rows: int) -> NDArray[np.float16]:
+    """An environment (H, 2 H, 3) in halfs, with at most ``rows`` rows, each a mean over its own.
+
+    Where halfs cannot hold it, which end at 65 504, all of it is scaled down. Raises ValueError for
+    a map that ``check_environment`` refuses.
+
+    >>> half_radiance(np.full((6, 12, 3), 2.0, np.float32), 4).shape
+    (4, 8, 3)
+    """
+    import cv2
+
+    check_environment(radiance)
+    kept: NDArray[Any] = radiance
+    if len(kept) > rows:
+        kept = cv2.resize(kept, (2 * rows, rows), interpolation=cv2.INTER_AREA)
+    brightest = float(kept.max())
+    if brightest > LARGEST_HALF:
+        kept = kept * np.float32(LARGEST_HALF / brightest)
+    return kept.astype(np.float16)
+
+
+def coverage_codes(coverage: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Coverage in [0, 1] as 8-bit codes, rounded to the nearest.
+
+    >>> coverage_codes(np.array([0.0, 0.5, 1.0], np.float32)).tolist()
+    [0, 128, 255]
+    """
+    return np.rint(coverage * 255.0).astype(np.uint8)
+
+
+def leaning_rows(fresnel: FresnelFactors) -> NDArray[np.float32]:
+    """What the shader needs of Fresnel's factor, (2, M): at theta = 0, and the exponent."""
+    return np.stack([fresnel.factor[0], fresnel.gamma]).astype(np.float32)
+
+
+class ReferenceView(NamedTuple):
+    """A frame of the stage that a live picture must show, too: (size, size, 3) of 8 bits, sRGB."""
+
+    name: str
+    camera: Camera
+    lamp: Lamp | None
+    frame: NDArray[np.uint8]
+
+
+def reference_views(
+    solid: Solid, actor: ScratchedActor, light: EnvironmentSampler, size: int
+) -> tuple[ReferenceView, ...]:
+    """The object from far and from close, and close with a lamp beside the environment."""
+    far, close = object_cameras(solid)
+    wanted = (("far", far, None), ("close", close, None), ("lamp", close, Lamp(_LAMP_AT, 4.0)))
+    return tuple(
+        ReferenceView(
+            name,
+            camera,
+            lamp,
+            exposed(
+                draw_scratched(
+                    actor, light, camera, width=size, height=size, supersampling=2, lamp=lamp
+                )[..., :3],
+                light,
+            ),
+        )
+        for name, camera, lamp in wanted
+    )
