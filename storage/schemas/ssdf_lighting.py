@@ -254,6 +254,14 @@ RELIT_FRAMES = Schema(
     },
 )
 
+LIT_PACKAGE = Schema(
+    _SYSTEM,
+    "lit_package",
+    1,
+    "The lit scene as a runtime package (docs/packages.md).",
+    {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
+)
+
 SCHEMAS = (
     SCENE_MESH,
     VISIBILITY,
@@ -262,4 +270,5 @@ SCHEMAS = (
     SSDF_BASIS,
     ENVIRONMENT_LIGHTS,
     RELIT_FRAMES,
+    LIT_PACKAGE,
 )

@@ -21,7 +21,8 @@ Progress = Callable[[float], None]
 DistancesAlong = Callable[[NDArray[np.int64], NDArray[np.float32]], NDArray[np.float32]]
 """Vertices (P,) and axes (P, L, 3) -> d (P, L), radians."""
 
-_BACKGROUND = (0.02, 0.02, 0.025)
+BACKGROUND = (0.02, 0.02, 0.025)
+"""Linear radiance where no surface is."""
 
 
 class TurningLight(NamedTuple):
@@ -55,7 +56,7 @@ def draw_turning_light(
     split = split_by_part(scene)
     actor = LitActor(split.mesh, lights)
     pictures, seconds = [], []
-    with Stage(*size, background=_BACKGROUND, supersampling=supersampling) as stage:
+    with Stage(*size, background=BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)
         stage.look(camera)
         for number, turn in enumerate(turns):
@@ -177,7 +178,7 @@ def cluster_picture(
         shader=PAINTED,
         lit=False,
     )
-    with Stage(*size, background=_BACKGROUND, supersampling=2) as stage:
+    with Stage(*size, background=BACKGROUND, supersampling=2) as stage:
         stage.add(painted)
         stage.look(camera)
         return stage.frame()

@@ -63,7 +63,7 @@ class LitActor:
         self._normals = np.ascontiguousarray(mesh.normals, np.float32)
         self._sharpness = np.array(lights.sharpness)
         tables = lobe_tables(materials, lights)
-        self._rows = _rows_of_lobes(mesh)
+        self._rows = rows_of_lobes(mesh)
         self._axis_tables = self._make_axis_tables(tables)
         corners = np.asarray(mesh.triangles)
         self._parts = [
@@ -116,13 +116,18 @@ class LitActor:
         has_gloss = self._materials.specular > 0
         if self._rows.max(initial=0) < len(has_gloss):
             return AxisTables(tables, has_gloss)
-        both = zip(tables.gloss, gloss_grid(), strict=True)
-        gloss = GlossLobes(*(np.concatenate(rows) for rows in both))
+        gloss = all_gloss_lobes(tables.gloss)
         has_gloss = np.append(has_gloss, np.ones(len(gloss.along) - len(has_gloss), bool))
         return AxisTables(LobeTables(tables.cosine, gloss), has_gloss)
 
 
-def _rows_of_lobes(mesh: LitMesh) -> NDArray[np.int32]:
+def all_gloss_lobes(of_materials: GlossLobes) -> GlossLobes:
+    """Rows of the materials, behind them those of the table for what has textures."""
+    both = zip(of_materials, gloss_grid(), strict=True)
+    return GlossLobes(*(np.concatenate(rows) for rows in both))
+
+
+def rows_of_lobes(mesh: LitMesh) -> NDArray[np.int32]:
     """(V,): whose lobes the vertices have: their material's, or, behind the materials, the row of
     the table that is nearest to what their textures say."""
     rows = np.array(mesh.object_of_vertex, np.int32)
