@@ -38,7 +38,7 @@ PAGE_FILES = ("index.html", "viewer.js", "viewer.css")
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-        "connect-src 'self' blob: data:; base-uri 'none'; form-action 'none'; "
+        "connect-src 'self' blob: data:; worker-src blob:; base-uri 'none'; form-action 'none'; "
         "frame-ancestors 'none'"
     ),
     "Cross-Origin-Resource-Policy": "same-origin",
