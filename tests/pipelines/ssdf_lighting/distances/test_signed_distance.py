@@ -196,7 +196,7 @@ def test_distances_to_arcs_are_those_to_points_along_them(
     exact = between(texel_directions(n), sampled(edge, 0, steps)).min(axis=1)
     assert (np.abs(found) <= exact + 2e-5).all()
     # Sampled points miss the nearest by no more than half a step, along the arc.
-    half = longest / steps / 2
+    half = longest / (steps - 1) / 2
     slack = exact - np.sqrt(np.maximum(exact**2 - half**2, 0.0))
     assert (np.abs(found) >= exact - slack - 2e-5).all()
 
