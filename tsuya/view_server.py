@@ -162,9 +162,9 @@ def serve(store: VersionedStore, keys: Sequence[str]) -> None:
     with TemporaryDirectory(prefix="tsuya-view-") as kept, socket.socket() as listener:
         app = view_app(store, offered, token, Path(kept))
         listener.bind((HOST, 0))
+        listener.listen()
         address = f"http://{HOST}:{listener.getsockname()[1]}/{token}/"
         click.echo(f"Viewer: {address} (Ctrl-C ends it)", err=True)
-        listener.listen()
         if _has_screen():
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         config = uvicorn.Config(

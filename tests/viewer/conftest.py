@@ -1,7 +1,8 @@
 """The viewer's page in headless Chromium.
 
 ``open_viewer(path, …)`` serves packages as `tsuya view` does and opens the page. When a test ends,
-its page must have said nothing in the console and asked no other host, but for what the test allows.
+its page must have said nothing in the console, but for what the test allows, and asked no other
+host.
 """
 
 from __future__ import annotations
@@ -60,9 +61,19 @@ class ViewerPage:
 
     def ready(self) -> ViewerPage:
         """Wait for the first frame, or for the gallery; raises what stopped it."""
-        self.page.wait_for_function("window.tsuya !== undefined")
+        self.wait_for("() => window.tsuya !== undefined")
         self.page.evaluate("() => window.tsuya.ready")
         return self
+
+    def wait_for(self, script: str) -> None:
+        """Wait until a function of JavaScript returns what is true.
+
+        Playwright's own way runs text as a script in the page, which the page's rules forbid.
+        """
+        end = time.monotonic() + _LOAD_SECONDS
+        while not self.page.evaluate(script):
+            assert time.monotonic() < end, f"waited in vain for {script}"
+            self.page.wait_for_timeout(30)
 
     def evaluate(self, script: str, argument: Any = None) -> Any:
         """What a function of JavaScript returns in the page."""
@@ -159,7 +170,7 @@ def open_viewer(chromium: Any, served: Callable[..., str]) -> Iterator[Callable[
 
     def open_page(
         *paths: Path,
-        size: tuple[int, int] = (640, 400),
+        size: tuple[int, int] = (800, 500),
         script: str = "",
         fragment: str = "",
         allowed: str | None = None,

@@ -1,0 +1,268 @@
+/** A scene under an environment that can be turned, or brought along. */
+
+import * as THREE from "three";
+import type { Camera, Vector } from "../drawing/camera";
+import { drawScene } from "../drawing/scene";
+import type { Surface } from "../drawing/surface";
+import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
+import type { MeshData } from "../package/mesh";
+import type { Package } from "../package/package";
+import { ask } from "./ssdf_lighting/ask";
+import { Backdrop } from "./ssdf_lighting/backdrop";
+import { clusterSurface } from "./ssdf_lighting/clusters";
+import type { DistanceTables } from "./ssdf_lighting/distance_tables";
+import { EdgePass } from "./ssdf_lighting/edge_pass";
+import { lightParts, litParts, readMaterials, type Materials } from "./ssdf_lighting/lit_parts";
+import { COLUMNS, FINE, type MattTables } from "./ssdf_lighting/lobe_tables";
+import { readProbe } from "./ssdf_lighting/probe_files";
+import { downsampled, Sphere, type Environment } from "./ssdf_lighting/sphere_map";
+import { tableTexture } from "./ssdf_lighting/tables";
+
+/** What can be set. */
+interface LitState {
+  /** Degrees, counter-clockwise from above. */
+  turn: number;
+  shadows: boolean;
+  clusters: boolean;
+  behind: boolean;
+  /** Stops. */
+  exposure: number;
+}
+
+/** The lights of an environment, with their tables. */
+interface Probe {
+  name: string;
+  environment: Environment;
+  axes: Float32Array;
+  sharpness: Float32Array;
+  amplitudes: Float32Array;
+  tables: MattTables;
+  irradianceError: number;
+}
+
+const SHOWN_ROWS = 128; // of a user's environment
+
+/** Everything that is read and decoded before the first frame. */
+interface Loaded {
+  mesh: MeshData;
+  materials: Materials;
+  distances: DistanceTables;
+  triangleCluster: ArrayLike<number>;
+  probe: Probe;
+}
+
+const viewer: SystemViewer = {
+  name: "ssdf_lighting",
+  async make(pkg, context) {
+    const [mesh, materials, distances, probe, cluster] = await Promise.all([
+      pkg.mesh("mesh"),
+      readMaterials(pkg),
+      readDistances(pkg),
+      readOwnProbe(pkg),
+      pkg.array("triangle_cluster"),
+    ]);
+    return new LitView(pkg, context, { mesh, materials, distances, triangleCluster: cluster, probe });
+  },
+};
+export default viewer;
+
+async function readDistances(pkg: Package): Promise<DistanceTables> {
+  if (pkg.has("ssdf")) {
+    const [file, rootWeight] = await Promise.all([pkg.array("ssdf"), pkg.floats("root_weight")]);
+    return ask({ kind: "file", file: file as Uint8Array, rootWeight });
+  }
+  const [first, rowVertex, rowFirst] = (await Promise.all(
+    ["first", "row_vertex", "row_first"].map((name) => pkg.array(name)),
+  )) as Int32Array[];
+  const [vectors, weights] = await Promise.all([pkg.floats("vectors"), pkg.floats("weights")]);
+  const vertices = rowVertex.reduce((most, vertex) => Math.max(most, vertex), 0) + 1;
+  const form = { vectors, directions: pkg.shape("vectors")[1], first, rowVertex, rowFirst, weights };
+  return ask({ kind: "paper", form, vertices });
+}
+
+async function readOwnProbe(pkg: Package): Promise<Probe> {
+  const [axes, sharpness, amplitudes, data] = await Promise.all(
+    ["light_axes", "light_sharpness", "light_amplitudes", "environment"].map((name) => pkg.floats(name)),
+  );
+  const environment = { height: pkg.shape("environment")[0], data };
+  const name = pkg.meta.source[1]?.name ?? "the package's";
+  const tables = await ask({ kind: "lobes", sharpness });
+  const irradianceError = pkg.parameter("irradiance_error");
+  return { name, environment, axes, sharpness, amplitudes, tables, irradianceError };
+}
+
+/** One package, live. */
+class LitView implements LiveView {
+  readonly navigation = "orbit";
+  readonly bounds: Bounds = { centre: [0, 0, 0], radius: 1 };
+  readonly home?: Camera;
+  private readonly settings: LitState = { turn: 0, shadows: true, clusters: false, behind: true, exposure: 0 };
+  private readonly scene = new THREE.Scene();
+  private readonly parts: Surface[];
+  private readonly backdrop = new Backdrop();
+  private readonly edges: EdgePass;
+  private readonly exposure: number;
+  private readonly background: Vector;
+  private readonly count: number;
+  private clusterScene: THREE.Scene | undefined;
+  private probe: Probe;
+  private mattAxes!: THREE.DataTexture;
+  private matt!: THREE.DataTexture;
+
+  constructor(
+    pkg: Package,
+    private readonly context: Context,
+    private readonly loaded: Loaded,
+  ) {
+    this.exposure = pkg.parameter("exposure");
+    this.background = pkg.parameter<Vector>("background");
+    this.probe = loaded.probe;
+    this.count = loaded.probe.sharpness.length;
+    const { mesh, materials, distances } = loaded;
+    const { SOURCE, LOBES } = mesh.attributes;
+    const vertices = { vertices: mesh.vertices, normals: mesh.normals!, source: SOURCE.values, lobes: LOBES.values };
+    const gloss = { values: glossAxes(materials), columns: materials.glossColumns };
+    this.edges = new EdgePass(context.renderer, vertices, distances, gloss, this.count);
+    const shared = { lightCount: this.count, edges: this.edges.texture, edgeRows: this.edges.rows };
+    this.parts = litParts(mesh, materials, shared);
+    this.scene.add(...this.parts, this.backdrop);
+    this.show(loaded.probe);
+  }
+
+  get controls(): Control[] {
+    return [
+      { kind: "slider", name: "turn", label: "Turn of the light", min: 0, max: 360, step: 1, units: "°" },
+      { kind: "slider", name: "exposure", label: "Exposure", min: -3, max: 3, step: 0.1, units: "stops" },
+      { kind: "toggle", name: "shadows", label: "Shadows" },
+      { kind: "toggle", name: "behind", label: "Environment behind" },
+      { kind: "toggle", name: "clusters", label: "Clusters" },
+      {
+        kind: "drop",
+        name: "probe",
+        label: "Light of your own: .hdr, .png, .jpg",
+        accept: ".hdr,.png,.jpg,.jpeg,.exr",
+        take: (file) => this.take(file),
+      },
+      { kind: "button", name: "own", label: "The package's light", press: () => this.show(this.loaded.probe) },
+    ];
+  }
+
+  state(): State {
+    return { ...this.settings };
+  }
+
+  setState(state: State): void {
+    for (const [name, value] of Object.entries(state)) {
+      if (!(name in this.settings)) continue;
+      const known = this.settings as unknown as Record<string, unknown>;
+      if (typeof value !== typeof known[name] || Number.isNaN(value)) {
+        throw new Error(`${name} is ${JSON.stringify(value)}; expected a ${typeof known[name]}.`);
+      }
+      known[name] = value;
+    }
+  }
+
+  draw(renderer: THREE.WebGLRenderer, camera: Camera, width: number, height: number): void {
+    const size: [number, number] = [width, height];
+    if (this.settings.clusters) {
+      this.clusterScene ??= new THREE.Scene().add(clusterSurface(this.loaded.mesh, this.loaded.triangleCluster));
+      drawScene(renderer, this.clusterScene, camera, size, this.bounds, this.background);
+      return;
+    }
+    const exposure = this.exposure * 2 ** this.settings.exposure;
+    const turn = (this.settings.turn * Math.PI) / 180;
+    const lights = turned(this.probe, turn, exposure);
+    const eye = eyeOf(camera);
+    this.edges.draw(renderer, eye, lights, this.mattAxes, this.settings.shadows);
+    lightParts(this.parts, eye, lights, this.matt);
+    this.backdrop.visible = this.settings.behind;
+    this.backdrop.set(turn, exposure);
+    const plain = this.background.map((value) => value * exposure) as Vector;
+    drawScene(renderer, this.scene, camera, size, this.bounds, plain);
+  }
+
+  figures(): Record<string, number | string> {
+    const { vectors, weights, sources } = this.loaded.distances;
+    return {
+      light: this.probe.name,
+      "spherical Gaussians": this.count,
+      "relative error of their irradiance": this.probe.irradianceError,
+      "distances on the graphics card, bytes": 2 * vectors.length + 4 * (weights.length + sources.length),
+    };
+  }
+
+  dispose(): void {
+    for (const part of this.parts) part.dispose();
+    for (const surface of this.clusterScene?.children ?? []) (surface as Surface).dispose();
+    this.backdrop.dispose();
+    this.edges.dispose();
+    this.mattAxes.dispose();
+    this.matt.dispose();
+  }
+
+  /** Lights the scene by a user's file, as bright on the whole as the package's environment. */
+  private async take(file: File): Promise<void> {
+    const given = await readProbe(file);
+    const rows = Math.min(given.height, SHOWN_ROWS);
+    const environment = downsampled(given, rows);
+    const own = this.loaded.probe.environment;
+    const scale = brightness(own) / brightness(environment);
+    if (!Number.isFinite(scale)) throw new Error(`${file.name}: radiance is 0 everywhere; expected some light.`);
+    environment.data.forEach((value, k, data) => (data[k] = value * scale));
+    const fit = await ask({ kind: "fit", environment, count: this.count });
+    const sharpness = Float32Array.from(fit.lights.sharpness);
+    this.show({
+      name: file.name,
+      environment,
+      axes: Float32Array.from(fit.lights.axes),
+      sharpness,
+      amplitudes: Float32Array.from(fit.lights.amplitudes),
+      tables: await ask({ kind: "lobes", sharpness }),
+      irradianceError: fit.irradianceError,
+    });
+  }
+
+  private show(probe: Probe): void {
+    this.probe = probe;
+    this.mattAxes?.dispose();
+    this.matt?.dispose();
+    this.mattAxes = tableTexture(probe.tables.axes, COLUMNS, this.count);
+    this.matt = tableTexture(probe.tables.radiance, FINE + 1, this.count);
+    this.backdrop.show(probe.environment);
+    this.context.requestDraw();
+  }
+}
+
+/** Sharpness -1 where a material has no gloss. */
+function glossAxes({ gloss, glossColumns, specular, count }: Materials): Float32Array {
+  const values = Float32Array.from(gloss);
+  for (let row = 0; row < count; row++) {
+    if (specular[row] > 0) continue;
+    for (let column = 0; column < glossColumns; column++) values[4 * (row * glossColumns + column)] = -1;
+  }
+  return values;
+}
+
+/** Lights as the shaders have them, turned about z, exposed. */
+function turned({ axes, sharpness, amplitudes }: Probe, turn: number, exposure: number) {
+  const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
+  const lights = new Float32Array(4 * sharpness.length);
+  sharpness.forEach((sharp, k) => {
+    const [x, y, z] = axes.subarray(3 * k, 3 * k + 3);
+    lights.set([cosine * x - sine * y, sine * x + cosine * y, z, sharp], 4 * k);
+  });
+  return { lights, amplitudes: amplitudes.map((value) => value * exposure) };
+}
+
+/** The view vector of a point x is the direction of eye.xyz - eye.w x. */
+function eyeOf({ position, target, height }: Camera): THREE.Vector4 {
+  if (height === null) return new THREE.Vector4(...position, 1);
+  const away = new THREE.Vector3(...position).sub(new THREE.Vector3(...target)).normalize();
+  return new THREE.Vector4(away.x, away.y, away.z, 0);
+}
+
+/** Mean luminance. */
+function brightness({ height, data }: Environment): number {
+  const [red, green, blue] = new Sphere(height).flux(data);
+  return (0.2126 * red + 0.7152 * green + 0.0722 * blue) / (4 * Math.PI);
+}

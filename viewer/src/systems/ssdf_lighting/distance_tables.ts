@@ -1,0 +1,184 @@
+/** Compressed SSDFs laid out for the graphics card: what `ssdf_lookup.glsl` reads. */
+
+import type { CompactCodes } from "./compact_file";
+
+const MEMORY_STEP = 0.5; // of the shared basis in memory over q
+const LEVELS_PER_OCTAVE = 4;
+
+/** Lines of texels of four numbers. */
+export interface DistanceTables {
+  /** n of n x n directions. */
+  resolution: number;
+  /** For each cluster, direction by direction: its centre, its vectors, zeros to whole texels. */
+  vectors: Float32Array;
+  /** For each vertex: 1, its weights, zeros. */
+  weights: Float32Array;
+  /** (V, 4): texel of the cluster's first, texels a direction, texel of the weights, 0. */
+  sources: Float32Array;
+}
+
+/** The paper's form, as a package has it. */
+export interface PapersForm {
+  vectors: Float32Array;
+  directions: number;
+  first: Int32Array;
+  rowVertex: Int32Array;
+  rowFirst: Int32Array;
+  weights: Float32Array;
+}
+
+/** Tables of the compact form; rootWeight (n²). */
+export function tablesOfCodes(codes: CompactCodes, rootWeight: Float32Array): DistanceTables {
+  const { step, ranks, centre, basis, level, sizes, cluster, resolution } = codes;
+  const directions = resolution * resolution;
+  const shared = sharedVectors(codes, rootWeight);
+  const rank = codes.sharedLevel.length;
+  const laid = layOut(ranks, directions);
+  const row = new Float64Array(directions);
+  let first = 0;
+  ranks.forEach((count, own) => {
+    combine(row, shared, centre.subarray(own * rank, (own + 1) * rank), step / Math.sqrt(Math.max(sizes[own], 1)));
+    laid.put(own, 0, row);
+    for (let k = 0; k < count; k++, first++) {
+      const scale = step / sigmaOf(level[first], step);
+      combine(row, shared, basis.subarray(first * rank, (first + 1) * rank), scale);
+      laid.put(own, k + 1, row);
+    }
+  });
+  const starts = new Uint32Array(ranks.length); // of the clusters' next weights
+  for (let own = 1; own < ranks.length; own++) starts[own] = starts[own - 1] + ranks[own - 1] * sizes[own - 1];
+  const weightsOf = [...cluster].map((own) => {
+    const start = starts[own];
+    starts[own] += ranks[own];
+    return { start, own };
+  });
+  const values = new Float32Array(codes.weights.length);
+  for (let k = 0; k < values.length; k++) values[k] = codes.weights[k] * step;
+  return laid.tables(resolution, weightsOf, values);
+}
+
+/** Tables of the paper's form; a vertex in several clusters is decoded from the first. */
+export function tablesOfPaper(form: PapersForm, vertices: number): DistanceTables {
+  const { directions, first, rowFirst, rowVertex } = form;
+  const ranks = Int32Array.from({ length: first.length - 1 }, (_, own) => first[own + 1] - first[own]);
+  const laid = layOut(ranks, directions);
+  const weightsOf: { start: number; own: number }[] = Array.from({ length: vertices }, () => ({ start: 0, own: 0 }));
+  const isPlaced = new Uint8Array(vertices);
+  let start = 0;
+  ranks.forEach((count, own) => {
+    for (let k = 0; k < count; k++) {
+      const at = (first[own] + k) * directions;
+      laid.put(own, k + 1, form.vectors.subarray(at, at + directions));
+    }
+    for (let row = rowFirst[own]; row < rowFirst[own + 1]; row++, start += count) {
+      const vertex = rowVertex[row];
+      if (!isPlaced[vertex]) weightsOf[vertex] = { start, own };
+      isPlaced[vertex] = 1;
+    }
+  });
+  return laid.tables(Math.round(Math.sqrt(directions)), weightsOf, form.weights);
+}
+
+/** Sigma that a level stands for. */
+function sigmaOf(level: number, step: number): number {
+  return step * 2 ** (level / LEVELS_PER_OCTAVE);
+}
+
+/** (R, n²): the shared vectors as they are in memory, no longer weighted. */
+function sharedVectors(codes: CompactCodes, rootWeight: Float32Array): Float64Array {
+  const { resolution: n, step, shared, sharedLevel } = codes;
+  const directions = n * n;
+  const found = new Float64Array(shared.length);
+  const cosines = cosineTable(n);
+  sharedLevel.forEach((level, row) => {
+    const own = shared.subarray(row * directions, (row + 1) * directions);
+    const square = inverseCosineTransform(own, cosines, n);
+    const sigma = sigmaOf(level, step);
+    const scale = (MEMORY_STEP * step) / sigma;
+    for (let k = 0; k < directions; k++) {
+      const value = Math.round((square[k] * step) / sigma / scale) * scale;
+      found[row * directions + k] = value / rootWeight[k];
+    }
+  });
+  return found;
+}
+
+/** (frequency, place) of the orthonormal cosine transform. */
+function cosineTable(n: number): Float64Array {
+  return Float64Array.from({ length: n * n }, (_, k) => {
+    const frequency = Math.floor(k / n);
+    const scale = Math.sqrt((frequency ? 2 : 1) / n);
+    return scale * Math.cos((Math.PI * frequency * ((k % n) + 0.5)) / n);
+  });
+}
+
+function inverseCosineTransform(codes: Int32Array, cosines: Float64Array, n: number): Float64Array {
+  const along = new Float64Array(n * n); // rows of frequencies, columns of places
+  const found = new Float64Array(n * n);
+  for (let row = 0; row < n; row++) {
+    for (let frequency = 0; frequency < n; frequency++) {
+      const code = codes[row * n + frequency];
+      if (code) for (let x = 0; x < n; x++) along[row * n + x] += code * cosines[frequency * n + x];
+    }
+  }
+  for (let frequency = 0; frequency < n; frequency++) {
+    for (let y = 0; y < n; y++) {
+      const cosine = cosines[frequency * n + y];
+      for (let x = 0; x < n; x++) found[y * n + x] += cosine * along[frequency * n + x];
+    }
+  }
+  return found;
+}
+
+/** Puts the sum of `scale` codes times vectors into `row`: many codes are 0. */
+function combine(row: Float64Array, vectors: Float64Array, codes: Int32Array, scale: number): void {
+  row.fill(0);
+  const size = row.length;
+  const some: number[] = [];
+  for (let k = 0; k < codes.length; k++) if (codes[k]) some.push(k);
+  const padded = [...some, ...new Array<number>((8 - (some.length % 8)) % 8).fill(some[0])];
+  // Eight vectors in one turn, 512 directions at a time: what is read stays near.
+  for (let begin = 0; begin < size; begin += 512) {
+    const end = Math.min(begin + 512, size);
+    for (let at = 0; at < padded.length; at += 8) {
+      const f = padded.slice(at, at + 8).map((k, i) => (at + i < some.length ? codes[k] * scale : 0));
+      const o = padded.slice(at, at + 8).map((k) => k * size);
+      const [f0, f1, f2, f3, f4, f5, f6, f7] = f;
+      const [o0, o1, o2, o3, o4, o5, o6, o7] = o;
+      for (let k = begin; k < end; k++) {
+        row[k] +=
+          f0 * vectors[o0 + k] + f1 * vectors[o1 + k] + (f2 * vectors[o2 + k] + f3 * vectors[o3 + k]) +
+          (f4 * vectors[o4 + k] + f5 * vectors[o5 + k] + (f6 * vectors[o6 + k] + f7 * vectors[o7 + k]));
+      }
+    }
+  }
+}
+
+/** Room for clusters of so many vectors, centres not counted. */
+function layOut(ranks: Int32Array, directions: number) {
+  const texels = Int32Array.from(ranks, (rank) => Math.ceil((rank + 1) / 4));
+  const starts = new Uint32Array(ranks.length + 1);
+  texels.forEach((count, own) => (starts[own + 1] = starts[own] + count * directions));
+  const vectors = new Float32Array(4 * starts[ranks.length]);
+  return {
+    /** Vector `place` of a cluster: 0 is its centre. */
+    put(own: number, place: number, row: Float32Array | Float64Array): void {
+      const width = 4 * texels[own];
+      let to = 4 * starts[own] + place;
+      for (let k = 0; k < directions; k++, to += width) vectors[to] = row[k];
+    },
+    /** The tables of vertices of these clusters, whose weights begin there. */
+    tables(resolution: number, of: { start: number; own: number }[], values: Float32Array): DistanceTables {
+      const sources = new Float32Array(4 * of.length);
+      const weights = new Float32Array(4 * of.reduce((count, { own }) => count + texels[own], 0));
+      let at = 0;
+      of.forEach(({ start, own }, vertex) => {
+        sources.set([starts[own], texels[own], at], 4 * vertex);
+        weights[4 * at] = 1;
+        weights.set(values.subarray(start, start + ranks[own]), 4 * at + 1);
+        at += texels[own];
+      });
+      return { resolution, vectors, weights, sources };
+    },
+  };
+}

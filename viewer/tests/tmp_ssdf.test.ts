@@ -1,0 +1,21 @@
+import { readFileSync } from "node:fs";
+import { it } from "vitest";
+import { readCompactFile } from "../src/systems/ssdf_lighting/compact_file";
+import { tablesOfCodes } from "../src/systems/ssdf_lighting/distance_tables";
+import { mattTables } from "../src/systems/ssdf_lighting/lobe_tables";
+import { fitLights } from "../src/systems/ssdf_lighting/environment_fit";
+it("times", () => {
+  let t = performance.now();
+  const lap = (n: string) => { const u = performance.now(); console.log(n, (u - t).toFixed(0)); t = performance.now(); };
+  const codes = readCompactFile(new Uint8Array(readFileSync("/tmp/lit/ssdf.bin")));
+  lap("codes");
+  const rw = new Float32Array(readFileSync("/tmp/lit/rw.bin").buffer.slice(0) as ArrayBuffer);
+  const tables = tablesOfCodes(codes, rw.subarray(0, 4096));
+  lap("tables"); console.log(codes.sharedLevel.length, codes.level.length, codes.ranks.length, tables.vectors.length);
+  let nz = 0; for (const c of codes.basis) if (c) nz++; console.log("nonzero", nz / codes.basis.length);
+  mattTables([3,5,10,20,40,80,160,300,3,5,10,20,40,80,160,300]);
+  lap("matt");
+  const raw = readFileSync("/tmp/lit/env.bin"); const env = new Float32Array(raw.buffer.slice(raw.byteOffset, raw.byteOffset + raw.byteLength) as ArrayBuffer);
+  const fit = fitLights({ height: 64, data: env }, 16);
+  lap("fit"); console.log(fit.irradianceError, fit.lights.sharpness);
+}, 100000);
