@@ -261,6 +261,14 @@ STREET_FRAMES = Schema(
     },
 )
 
+STREET_PACKAGE = Schema(
+    _SYSTEM,
+    "street_package",
+    1,
+    "The street as a runtime package (docs/packages.md).",
+    {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
+)
+
 SCHEMAS = (
     DRIVE_FRAMES,
     DEPTH_MAPS,
@@ -270,4 +278,5 @@ SCHEMAS = (
     EIGEN_TEXTURES,
     TEXTURE_ATLASES,
     STREET_FRAMES,
+    STREET_PACKAGE,
 )

@@ -3,12 +3,18 @@
 
 #include "billboard.glsl"
 #include "billboard_mask.glsl"
+#if SHOW_BILLBOARDS
+#include "billboard_colour.glsl"
+#endif
 #include "eigen_planes.glsl"
 #include "srgb.glsl"
 #include "ycocg.glsl"
 
 uniform sampler2D masks;
 in vec2 placeOut;
+#if SHOW_BILLBOARDS
+flat in vec3 centreOut;
+#endif
 flat in vec4 baseOut;
 flat in vec4 tilesOut;
 flat in vec4 runsOut;
@@ -31,7 +37,11 @@ vec3 surfaceColour() {
   ivec2 corner = ivec2(texel);
   vec2 between = texel - vec2(corner);
   ivec2 mask = ivec2(runsOut.w, baseOut.w);
-  if (maskBetween(masks, mask, corner, between) < 0.5) discard;
+  float alpha = maskBetween(masks, mask, corner, between);
+#if SHOW_BILLBOARDS
+  if (atRim(placeOut)) return rimOf(centreOut);
+#endif
+  if (alpha < 0.5) discard;
   vec3 codes = baseOut.rgb;
 #if DETAIL_TILES
   vec2 detailTile = tilesOut.xy;
@@ -69,5 +79,9 @@ vec3 surfaceColour() {
 #if YCOCG
   codes = rgbFromYcocg(codes);
 #endif
-  return linearFromSrgb(clamp(codes / 255.0, 0.0, 1.0));
+  vec3 light = linearFromSrgb(clamp(codes / 255.0, 0.0, 1.0));
+#if SHOW_BILLBOARDS
+  light = tinted(light, centreOut);
+#endif
+  return light;
 }

@@ -9,6 +9,9 @@ uniform mat4 MCVCMatrix;
 uniform sampler2D headers;
 uniform sampler2D views;
 out vec2 placeOut;
+#if SHOW_BILLBOARDS
+flat out vec3 centreOut;
+#endif
 flat out vec4 baseOut;   // colour without planes, in codes; row of the mask
 flat out vec4 tilesOut;  // column and row of the first tile of detail, and of tint
 flat out vec4 runsOut;   // tiles of detail, of tint; where channel 2 begins; column of the mask
@@ -66,5 +69,8 @@ void placeVertex() {
                  mask % MASK_COLUMNS * SIDE);
   float s = corner == 1 || corner == 2 ? 1.0 : -1.0, t = corner > 1 ? 1.0 : -1.0;
   placeOut = vec2(0.5 + 0.5 * s, 0.5 - 0.5 * t);
+#if SHOW_BILLBOARDS
+  centreOut = billboard.centre;
+#endif
   gl_Position = MCDCMatrix * vec4(billboardPoint(billboard, towards, s, t), 1.0);
 }

@@ -36,9 +36,10 @@ class ShaderStreet:
     """Billboards with textures that the shader decodes.
 
     textures: of the same b billboards, or as ``atlases.pack_pages`` packed them. most_texels: of a
-    texture's side, where they are still to be packed; less where the driver has less. ``actors``
-    are for ``Stage.add``, one a page; nothing shows before ``look``. Raises ValueError as
-    ``atlases.pack_pages``, and for pages that the driver cannot hold or of other billboards.
+    texture's side, where they are still to be packed; less where the driver has less.
+    show_billboards: in colours of their own, with their rims. ``actors`` are for ``Stage.add``, one
+    a page; nothing shows before ``look``. Raises ValueError as ``atlases.pack_pages``, and for
+    pages that the driver cannot hold or of other billboards.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class ShaderStreet:
         textures: CompressedTextures | Sequence[Page],
         *,
         most_texels: int = MOST_TEXELS,
+        show_billboards: bool = False,
     ) -> None:
         most = largest_texture()
         if isinstance(textures, CompressedTextures):
@@ -55,7 +57,7 @@ class ShaderStreet:
         _check_pages(self.pages, len(billboards.centre), most)
         self._billboards = billboards
         self._drawable = np.concatenate([np.empty(0, bool), *(p.has_views for p in self.pages)])
-        self.actors = [_page_actor(billboards, page) for page in self.pages]
+        self.actors = [_page_actor(billboards, page, show_billboards) for page in self.pages]
 
     def look(
         self,
@@ -89,7 +91,8 @@ def _check_pages(pages: Sequence[Page], count: int, most: int) -> None:
         )
 
 
-def _page_actor(billboards: Billboards, page: Page) -> Any:
+def page_headers(billboards: Billboards, page: Page) -> NDArray[np.float32]:
+    """A page's billboards as `billboard.glsl` reads them: five texels each, (y, 5 columns, 4)."""
     rows = page.billboards
     geometry = np.zeros((len(rows), 3, 4), np.float32)
     geometry[:, 0, :3] = billboards.centre[rows]
@@ -102,8 +105,13 @@ def _page_actor(billboards: Billboards, page: Page) -> Any:
     header_rows = -(-len(rows) // columns)
     sheet = np.zeros((header_rows * columns, 5, 4), np.float32)
     sheet[: len(rows)] = headers
+    return sheet.reshape(header_rows, columns * 5, 4)
+
+
+def _page_actor(billboards: Billboards, page: Page, show_billboards: bool) -> Any:
+    headers = page_headers(billboards, page)
     images = {
-        "headers": _fixed(sheet.reshape(header_rows, columns * 5, 4)),
+        "headers": _fixed(headers),
         "views": _fixed(page.views),
         "masks": _fixed(page.masks),
     }
@@ -112,10 +120,10 @@ def _page_actor(billboards: Billboards, page: Page) -> Any:
             images[name] = _fixed(atlas.texels, interpolate=True)
             images[f"{name}Scales"] = _fixed(atlas.scales)
     actor = surface(
-        _bounding_points(billboards, rows),
+        _bounding_points(billboards, page.billboards),
         QUAD.reshape(-1, 3),
         textures=images,
-        shader=_shader(page, columns),
+        shader=_shader(page, headers.shape[1] // 5, show_billboards),
         lit=False,
     )
     send_quads(actor, np.empty(0, np.int64))
@@ -138,7 +146,7 @@ def _fixed(image: NDArray[Any], *, interpolate: bool = False) -> Any:
     return texture(np.ascontiguousarray(image[::-1]), wrap="clamp", interpolate=interpolate)
 
 
-def _shader(page: Page, header_columns: int) -> Shader:
+def _shader(page: Page, header_columns: int, show_billboards: bool) -> Shader:
     is_ycocg = bool(page.flags[0, 1])
     values: dict[str, Any] = {}
     for name, atlas in (("DETAIL", page.detail), ("TINT", page.tint)):
@@ -155,6 +163,7 @@ def _shader(page: Page, header_columns: int) -> Shader:
         HEADER_COLUMNS=header_columns,
         VIEW_COLUMNS=page.views.shape[1],
         MASK_COLUMNS=page.masks.shape[1] // SIDE,
+        SHOW_BILLBOARDS=show_billboards,
         YCOCG=is_ycocg,
         NEUTRAL=[0.0, 128.0, 128.0] if is_ycocg else [0.0, 0.0, 0.0],
         **values,

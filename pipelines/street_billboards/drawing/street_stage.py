@@ -38,6 +38,7 @@ class StreetStage:
     """A stage with a street on it; use it as a context manager.
 
     sky: radiance, equirectangular (``sky.sky_map``); size: width and height in pixels.
+    show_billboards: in colours of their own, with their rims.
     """
 
     def __init__(
@@ -48,9 +49,10 @@ class StreetStage:
         size: tuple[int, int],
         *,
         supersampling: int = 1,
+        show_billboards: bool = False,
     ) -> None:
         self._size = size
-        self._street = ShaderStreet(billboards, pages)
+        self._street = ShaderStreet(billboards, pages, show_billboards=show_billboards)
         self._stage = Stage(*size, supersampling=supersampling)
         self._stage.add(*self._street.actors)
         self._sky = sky

@@ -88,7 +88,7 @@ def unpacked_error(pages: Sequence[Page], textures: CompressedTextures) -> float
     for page in pages:
         for place in _some(np.flatnonzero(np.diff(textures.first)[page.billboards] > 0)):
             number = int(page.billboards[place])
-            found, masks = _read(page, int(place))
+            found, masks = page_billboard(page, int(place))
             most = max(most, float(np.abs(found - decode_billboard(textures, number)).max()))
             if not np.array_equal(masks, unpack_masks(textures, number)):
                 return 255.0
@@ -99,8 +99,8 @@ def _some(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
     return numbers[:: max(len(numbers) // _DECODED, 1)]
 
 
-def _read(page: Page, place: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Views (n, 32, 32, 3) and masks (1 or n, 32, 32) of a page's billboard."""
+def page_billboard(page: Page, place: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Views (n, 32, 32, 3) in codes and masks (1 or n, 32, 32) of a page's billboard."""
     (texel, mask, low, high), (detail, tint, code, second) = page.records[place].astype(np.int64)
     count = int(low).bit_count() + int(high).bit_count()
     code = int(code)
