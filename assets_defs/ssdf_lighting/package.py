@@ -269,6 +269,7 @@ def _distances(ssdf_basis: xr.Dataset) -> dict[str, Any]:
 def _views(pictures: _Pictures) -> list[View]:
     from dataclasses import asdict
 
+    from pipelines.ssdf_lighting.drawing.live_parts import SUPERSAMPLING
     from storage.packages import View
 
     camera = asdict(pictures.camera)
@@ -278,7 +279,7 @@ def _views(pictures: _Pictures) -> list[View]:
             f"reference_{view.name}",
             view.frame.shape[1],
             view.frame.shape[0],
-            view.supersampling,
+            SUPERSAMPLING,
             camera,
             {
                 "turn": view.turn,

@@ -1,6 +1,7 @@
 // A mesh lit by spherical Gaussians: distances to the edge of the visible sky, four in a vector:
-// of LIGHTS matt lobes, and after these, from a new vector on, of as many glossy ones. With
-// textures (TEXTURED) it has places in them and a colour, else the number of its material.
+// of LIGHTS matt lobes, and after these, from a new vector on, of as many glossy ones: attributes,
+// or, with EDGES_FETCHED, texels of lit_distances.glsl, EDGE_ROWS rows a vector. With textures
+// (TEXTURED) it has places in them and a colour, else the number of its material.
 
 in vec3 shading;
 #if TEXTURED
@@ -12,7 +13,12 @@ out vec4 mappingsOut;
 in float object;
 flat out float objectOut;
 #endif
+#if EDGES_FETCHED
+in float number;
+uniform sampler2D fetchedEdges;
+#else
 in vec4 edge0, edge1, edge2, edge3, edge4, edge5, edge6, edge7, edge8, edge9, edge10, edge11;
+#endif
 out vec3 shadingOut;
 out vec3 placeOut;
 out vec4 edges[EDGES];
@@ -26,6 +32,15 @@ void placeVertex() {
 #else
   objectOut = object;
 #endif
+#if EDGES_FETCHED
+  int vertex = int(number + 0.5), columns = textureSize(fetchedEdges, 0).x;
+  ivec2 at = ivec2(vertex % columns, vertex / columns);
+#pragma unroll_loop_start
+  for (int i = 0; i < EDGES; i++) {
+    edges[i] = texelFetch(fetchedEdges, at + ivec2(0, i * EDGE_ROWS), 0);
+  }
+#pragma unroll_loop_end
+#else
   vec4 given[12] = vec4[12](edge0, edge1, edge2, edge3, edge4, edge5,
                             edge6, edge7, edge8, edge9, edge10, edge11);
 #pragma unroll_loop_start
@@ -33,4 +48,5 @@ void placeVertex() {
     edges[i] = given[i];
   }
 #pragma unroll_loop_end
+#endif
 }

@@ -27,6 +27,8 @@ Floats = NDArray[np.float32]
 
 TURNS = (0.0, 120.0)
 """Degrees, of the reference views."""
+SUPERSAMPLING = 2
+"""Of the reference views."""
 _LARGEST_HALF = 65504.0
 
 
@@ -55,7 +57,6 @@ class ReferenceView(NamedTuple):
     turn: float
     shadows: bool
     clusters: bool
-    supersampling: int
 
 
 def live_mesh(scene: Scene) -> LiveMesh:
@@ -110,7 +111,9 @@ def reference_views(
     height), ``cluster`` (F,)."""
 
     def drawn(distances: DistancesAlong, turns: tuple[float, ...]) -> NDArray[np.uint8]:
-        turning = draw_turning_light(scene, lights, distances, camera, size, turns)
+        turning = draw_turning_light(
+            scene, lights, distances, camera, size, turns, supersampling=SUPERSAMPLING
+        )
         return exposed(turning.radiance, exposure)
 
     lit = drawn(distances_along, TURNS)
@@ -118,11 +121,11 @@ def reference_views(
     clusters = cluster_picture(scene, cluster, camera, size)
     return [
         *(
-            ReferenceView(f"turn_{turn:.0f}", frame, turn, True, False, 1)
+            ReferenceView(f"turn_{turn:.0f}", frame, turn, True, False)
             for turn, frame in zip(TURNS, lit, strict=True)
         ),
-        ReferenceView("without_shadows", plain, TURNS[0], False, False, 1),
-        ReferenceView("clusters", clusters, TURNS[0], True, True, 2),
+        ReferenceView("without_shadows", plain, TURNS[0], False, False),
+        ReferenceView("clusters", clusters, TURNS[0], True, True),
     ]
 
 

@@ -169,6 +169,7 @@ class _Part:
                 LIGHTS=count,
                 EDGES=len(names),
                 MATT_HALF=_FINE / 2,
+                EDGES_FETCHED=False,
                 **finish.values,
             ),
             lit=False,

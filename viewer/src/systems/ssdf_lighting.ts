@@ -42,11 +42,11 @@ interface Probe {
 
 const SHOWN_ROWS = 128; // of a user's environment
 
-/** Everything that is read and decoded before the first frame. */
+/** What was read; the distances may still be decoded when the first frame is drawn. */
 interface Loaded {
   mesh: MeshData;
   materials: Materials;
-  distances: DistanceTables;
+  distances: Promise<DistanceTables>;
   triangleCluster: ArrayLike<number>;
   probe: Probe;
 }
@@ -54,14 +54,15 @@ interface Loaded {
 const viewer: SystemViewer = {
   name: "ssdf_lighting",
   async make(pkg, context) {
-    const [mesh, materials, distances, probe, cluster] = await Promise.all([
+    const distances = readDistances(pkg);
+    distances.catch(() => {}); // told by `update`
+    const [mesh, materials, probe, triangleCluster] = await Promise.all([
       pkg.mesh("mesh"),
       readMaterials(pkg),
-      readDistances(pkg),
       readOwnProbe(pkg),
       pkg.array("triangle_cluster"),
     ]);
-    return new LitView(pkg, context, { mesh, materials, distances, triangleCluster: cluster, probe });
+    return new LitView(pkg, context, { mesh, materials, distances, triangleCluster, probe });
   },
 };
 export default viewer;
@@ -105,6 +106,9 @@ class LitView implements LiveView {
   private readonly background: Vector;
   private readonly count: number;
   private clusterScene: THREE.Scene | undefined;
+  private readonly whole: Promise<void>;
+  private ended = false;
+  private distanceBytes: number | undefined;
   private probe: Probe;
   private mattAxes!: THREE.DataTexture;
   private matt!: THREE.DataTexture;
@@ -118,15 +122,27 @@ class LitView implements LiveView {
     this.background = pkg.parameter<Vector>("background");
     this.probe = loaded.probe;
     this.count = loaded.probe.sharpness.length;
-    const { mesh, materials, distances } = loaded;
+    const { mesh, materials } = loaded;
     const { SOURCE, LOBES } = mesh.attributes;
     const vertices = { vertices: mesh.vertices, normals: mesh.normals!, source: SOURCE.values, lobes: LOBES.values };
     const gloss = { values: glossAxes(materials), columns: materials.glossColumns };
-    this.edges = new EdgePass(context.renderer, vertices, distances, gloss, this.count);
+    this.edges = new EdgePass(context.renderer, vertices, gloss, this.count);
     const shared = { lightCount: this.count, edges: this.edges.texture, edgeRows: this.edges.rows };
     this.parts = litParts(mesh, materials, shared);
     this.scene.add(...this.parts, this.backdrop);
     this.show(loaded.probe);
+    this.whole = loaded.distances.then((tables) => {
+      this.distanceBytes = 2 * tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
+      if (this.ended) return;
+      this.edges.load(tables);
+      context.requestDraw();
+    });
+    this.whole.catch(() => {}); // told by `update`
+  }
+
+  /** Settled when shadows are there. */
+  update(): Promise<void> {
+    return this.whole;
   }
 
   get controls(): Control[] {
@@ -182,16 +198,16 @@ class LitView implements LiveView {
   }
 
   figures(): Record<string, number | string> {
-    const { vectors, weights, sources } = this.loaded.distances;
     return {
       light: this.probe.name,
       "spherical Gaussians": this.count,
       "relative error of their irradiance": this.probe.irradianceError,
-      "distances on the graphics card, bytes": 2 * vectors.length + 4 * (weights.length + sources.length),
+      "distances on the graphics card, bytes": this.distanceBytes ?? "are being decoded",
     };
   }
 
   dispose(): void {
+    this.ended = true;
     for (const part of this.parts) part.dispose();
     for (const surface of this.clusterScene?.children ?? []) (surface as Surface).dispose();
     this.backdrop.dispose();

@@ -34,7 +34,7 @@ export function tablesOfCodes(codes: CompactCodes, rootWeight: Float32Array): Di
   const shared = sharedVectors(codes, rootWeight);
   const rank = codes.sharedLevel.length;
   const laid = layOut(ranks, directions);
-  const row = new Float64Array(directions);
+  const row = new Float32Array(directions);
   let first = 0;
   ranks.forEach((count, own) => {
     combine(row, shared, centre.subarray(own * rank, (own + 1) * rank), step / Math.sqrt(Math.max(sizes[own], 1)));
@@ -84,23 +84,22 @@ function sigmaOf(level: number, step: number): number {
   return step * 2 ** (level / LEVELS_PER_OCTAVE);
 }
 
-/** (R, n²): the shared vectors as they are in memory, no longer weighted. */
-function sharedVectors(codes: CompactCodes, rootWeight: Float32Array): Float64Array {
+/** R vectors (n²): the shared ones as they are in memory, no longer weighted. */
+function sharedVectors(codes: CompactCodes, rootWeight: Float32Array): Float32Array[] {
   const { resolution: n, step, shared, sharedLevel } = codes;
   const directions = n * n;
-  const found = new Float64Array(shared.length);
   const cosines = cosineTable(n);
-  sharedLevel.forEach((level, row) => {
+  return Array.from(sharedLevel, (level, row) => {
     const own = shared.subarray(row * directions, (row + 1) * directions);
     const square = inverseCosineTransform(own, cosines, n);
     const sigma = sigmaOf(level, step);
     const scale = (MEMORY_STEP * step) / sigma;
+    const found = new Float32Array(directions);
     for (let k = 0; k < directions; k++) {
-      const value = Math.round((square[k] * step) / sigma / scale) * scale;
-      found[row * directions + k] = value / rootWeight[k];
+      found[k] = (Math.round((square[k] * step) / sigma / scale) * scale) / rootWeight[k];
     }
+    return found;
   });
-  return found;
 }
 
 /** (frequency, place) of the orthonormal cosine transform. */
@@ -131,26 +130,22 @@ function inverseCosineTransform(codes: Int32Array, cosines: Float64Array, n: num
 }
 
 /** Puts the sum of `scale` codes times vectors into `row`: many codes are 0. */
-function combine(row: Float64Array, vectors: Float64Array, codes: Int32Array, scale: number): void {
+function combine(row: Float32Array, vectors: Float32Array[], codes: Int32Array, scale: number): void {
   row.fill(0);
-  const size = row.length;
   const some: number[] = [];
   for (let k = 0; k < codes.length; k++) if (codes[k]) some.push(k);
-  const padded = [...some, ...new Array<number>((8 - (some.length % 8)) % 8).fill(some[0])];
-  // Eight vectors in one turn, 512 directions at a time: what is read stays near.
-  for (let begin = 0; begin < size; begin += 512) {
-    const end = Math.min(begin + 512, size);
-    for (let at = 0; at < padded.length; at += 8) {
-      const f = padded.slice(at, at + 8).map((k, i) => (at + i < some.length ? codes[k] * scale : 0));
-      const o = padded.slice(at, at + 8).map((k) => k * size);
-      const [f0, f1, f2, f3, f4, f5, f6, f7] = f;
-      const [o0, o1, o2, o3, o4, o5, o6, o7] = o;
-      for (let k = begin; k < end; k++) {
-        row[k] +=
-          f0 * vectors[o0 + k] + f1 * vectors[o1 + k] + (f2 * vectors[o2 + k] + f3 * vectors[o3 + k]) +
-          (f4 * vectors[o4 + k] + f5 * vectors[o5 + k] + (f6 * vectors[o6 + k] + f7 * vectors[o7 + k]));
-      }
-    }
+  for (let at = 0; at < some.length; at += 8) {
+    const own = Array.from({ length: 8 }, (_, i) => some[at + i] ?? some[at]);
+    addEight(row, own.map((k) => vectors[k]), own.map((k, i) => (at + i < some.length ? codes[k] * scale : 0)));
+  }
+}
+
+/** Adds eight vectors times factors: most of the time of all goes here. */
+function addEight(row: Float32Array, [a, b, c, d, e, f, g, h]: Float32Array[], factors: number[]): void {
+  const [fa, fb, fc, fd, fe, ff, fg, fh] = factors;
+  for (let k = 0; k < row.length; k++) {
+    row[k] +=
+      fa * a[k] + fb * b[k] + (fc * c[k] + fd * d[k]) + (fe * e[k] + ff * f[k] + (fg * g[k] + fh * h[k]));
   }
 }
 
@@ -162,7 +157,7 @@ function layOut(ranks: Int32Array, directions: number) {
   const vectors = new Float32Array(4 * starts[ranks.length]);
   return {
     /** Vector `place` of a cluster: 0 is its centre. */
-    put(own: number, place: number, row: Float32Array | Float64Array): void {
+    put(own: number, place: number, row: Float32Array): void {
       const width = 4 * texels[own];
       let to = 4 * starts[own] + place;
       for (let k = 0; k < directions; k++, to += width) vectors[to] = row[k];

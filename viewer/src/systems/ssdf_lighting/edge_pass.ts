@@ -29,24 +29,26 @@ export interface LightUniforms {
 const VERTEX = "in vec3 position;\nvoid main() { gl_Position = vec4(position.xy, 0.0, 1.0); }\n";
 const NOTHING_HIDDEN = new THREE.Color(Math.PI, Math.PI, Math.PI);
 
-/** Makes the texture that `lit_vertex.glsl` fetches: EDGE_ROWS rows for each four lobes. */
+/**
+ * Makes the texture that `lit_vertex.glsl` fetches: EDGE_ROWS rows for each four lobes. Until there
+ * are distances nothing is hidden.
+ */
 export class EdgePass {
   /** Rows that four lobes of all vertices take. */
   readonly rows: number;
   private readonly target: THREE.WebGLRenderTarget;
-  private readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+  private mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial> | undefined;
   private readonly nowhere = new THREE.Camera();
   private readonly groups: number;
   private drawn = "";
 
   constructor(
     renderer: THREE.WebGLRenderer,
-    mesh: LobeVertices,
-    tables: DistanceTables,
-    glossAxes: { values: Float32Array; columns: number },
-    lightCount: number,
+    private readonly vertices: LobeVertices,
+    private readonly glossAxes: { values: Float32Array; columns: number },
+    private readonly lightCount: number,
   ) {
-    const count = mesh.source.length;
+    const count = vertices.source.length;
     this.rows = Math.ceil(count / COLUMNS);
     this.groups = Math.ceil(lightCount / 4);
     const isFloat = renderer.extensions.has("EXT_color_buffer_float");
@@ -56,6 +58,12 @@ export class EdgePass {
       magFilter: THREE.NearestFilter,
       depthBuffer: false,
     });
+  }
+
+  /** Takes the distances. */
+  load(tables: DistanceTables): void {
+    const { vertices: mesh, lightCount } = this;
+    const count = mesh.source.length;
     const places = new Float32Array(4 * count);
     const normals = new Float32Array(4 * count);
     for (let v = 0; v < count; v++) {
@@ -64,7 +72,7 @@ export class EdgePass {
       places[4 * v + 3] = mesh.lobes[v];
       normals[4 * v + 3] = mesh.source[v];
     }
-    const { values, columns } = glossAxes;
+    const { values, columns } = this.glossAxes;
     const uniforms = {
       eye: { value: new THREE.Vector4() },
       lights: { value: new Float32Array(4 * lightCount) },
@@ -91,6 +99,7 @@ export class EdgePass {
       }),
     );
     this.mesh.frustumCulled = false;
+    this.drawn = "";
   }
 
   /** The texture. */
@@ -104,25 +113,27 @@ export class EdgePass {
     eye: THREE.Vector4,
     { lights }: LightUniforms,
     mattAxes: THREE.Texture,
-    shadows: boolean,
+    asked: boolean,
   ): void {
+    const { mesh } = this;
+    const shadows = asked && mesh !== undefined;
     const ofMatt = `${shadows} ${shadows ? `${lights.join()} ${mattAxes.id}` : ""}`;
     const ofGloss = `${ofMatt} ${shadows ? eye.toArray().join() : ""}`;
     if (ofGloss === this.drawn) return;
     const isMattDrawn = this.drawn.startsWith(`${ofMatt} `);
     const bound = renderer.getRenderTarget();
-    const { uniforms } = this.mesh.material;
-    uniforms.eye.value.copy(eye);
-    uniforms.lights.value = lights;
-    uniforms.mattAxes.value = mattAxes;
-    this.mesh.material.uniformsNeedUpdate = true;
     const half = this.groups * this.rows;
     const first = isMattDrawn && shadows ? half : 0;
     this.target.scissor.set(0, first, COLUMNS, 2 * half - first);
     this.target.scissorTest = true;
     renderer.setRenderTarget(this.target);
     if (shadows) {
-      renderer.render(this.mesh, this.nowhere);
+      const { uniforms } = mesh.material;
+      uniforms.eye.value.copy(eye);
+      uniforms.lights.value = lights;
+      uniforms.mattAxes.value = mattAxes;
+      mesh.material.uniformsNeedUpdate = true;
+      renderer.render(mesh, this.nowhere);
     } else {
       renderer.setClearColor(NOTHING_HIDDEN, Math.PI);
       renderer.clear();
@@ -134,9 +145,11 @@ export class EdgePass {
   /** Frees what it holds on the graphics card. */
   dispose(): void {
     this.target.dispose();
-    this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
-    for (const [name, { value }] of Object.entries(this.mesh.material.uniforms)) {
+    if (!this.mesh) return;
+    const { geometry, material } = this.mesh;
+    geometry.dispose();
+    material.dispose();
+    for (const [name, { value }] of Object.entries(material.uniforms)) {
       if (name !== "mattAxes" && value instanceof THREE.Texture) value.dispose();
     }
   }
