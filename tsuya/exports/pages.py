@@ -91,7 +91,7 @@ def _hash(text: str) -> str:
 
 def _restricted(page: str, allowed: str) -> str:
     """The page with a rule that lets it ask no other host for anything."""
-    rule = f"default-src 'none'; {allowed}; img-src data: blob:; base-uri 'none'"
+    rule = f"default-src 'none'; {allowed}; img-src data: blob:; worker-src blob:; base-uri 'none'"
     meta = f'<meta http-equiv="Content-Security-Policy" content="{rule}">'
     return _replaced(page, _HEAD, f"{_HEAD}\n    {meta}")
 
