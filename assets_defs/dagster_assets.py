@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any
 import dagster as dg
 
 from assets_defs.checks import Check, figure_before
-from assets_defs.dagster_metadata import dagster_metadata, picture_metadata
+from assets_defs.dagster_metadata import (
+    dagster_metadata,
+    live_view_metadata,
+    picture_metadata,
+)
 from assets_defs.dagster_settings import config_class
 from assets_defs.ended_runs import tag_run
 from assets_defs.lineage import lineage
@@ -21,6 +25,7 @@ from assets_defs.partitions import keys_of_partition
 from assets_defs.picture_links import PictureLinks
 from assets_defs.provenance import provenance
 from assets_defs.system import NOTES, AssetPlan, System
+from assets_defs.viewer_files import live_view_address
 from assets_defs.workspace import Workspace
 from storage.errors import DamagedError, NoVersionError, StoreError
 from storage.io_manager import INTERRUPTED, damage_failure
@@ -136,6 +141,7 @@ def _materialise(
         pictures = plan.pictures(dataset) if plan.pictures else {}
         links = PictureLinks(workspace, system.slot(plan.name, keys))
         shown = picture_metadata(pictures, links.keep) | dagster_metadata(metadata)
+        shown |= live_view_metadata(live_view_address(workspace, links.slot))
     except (KeyboardInterrupt, dg.DagsterExecutionInterruptedError) as stop:
         # Left to itself, Dagster would take the interruption for trouble and try again.
         raise dg.Failure(description=INTERRUPTED, allow_retries=False) from stop

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PICTURE = "picture: "
 FULL_SIZE = "full size: "
+LIVE_VIEW = "live view"
 MOST_BYTES = 100_000
 _WIDEST = 512
 
@@ -27,7 +28,7 @@ def dagster_metadata(metadata: Mapping[str, Any]) -> dict[str, Any]:
     Raises ValueError for a name that is kept for pictures.
     """
     for name in metadata:
-        if name.startswith((PICTURE, FULL_SIZE)):
+        if name.startswith((PICTURE, FULL_SIZE)) or name == LIVE_VIEW:
             raise ValueError(f"metadata {name!r} is named like a picture; expected another name.")
     shown = {name: _shown(value) for name, value in metadata.items() if name != NOTES}
     if metadata.get(NOTES):
@@ -47,6 +48,11 @@ def picture_metadata(
         shown[PICTURE + name] = thumbnail(picture)
         shown[FULL_SIZE + name] = dg.MetadataValue.url(link(name, picture))
     return shown
+
+
+def live_view_metadata(address: str | None) -> dict[str, Any]:
+    """The link to a package's live view, where it is a package."""
+    return {LIVE_VIEW: dg.MetadataValue.url(address)} if address else {}
 
 
 def _shown(value: Any) -> Any:

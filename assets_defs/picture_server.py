@@ -1,4 +1,4 @@
-"""Serves a data folder's pictures of full size: on this machine, to read, and nothing else.
+"""Serves a data folder's pictures of full size and its live views: on this machine, to read.
 
 `tsuya ui` starts it as a process of its own beside the web UI; it ends with its parent.
 """
@@ -17,6 +17,8 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from assets_defs.picture_links import HOST
+from assets_defs.viewer_files import HEADERS, found_viewer_file
+from assets_defs.workspace import Workspace
 
 _KINDS = {".png": "image/png", ".webp": "image/webp"}
 _WATCH_SECONDS = 1.0
@@ -68,20 +70,26 @@ class _Handler(BaseHTTPRequestHandler):
         if self.headers.get("Host", "").rpartition(":")[0] not in (HOST, "localhost"):
             self.send_error(HTTPStatus.FORBIDDEN)
             return None
-        path = found_picture(self.server.folder, self.path)
-        try:
-            data = path.read_bytes() if path else None
-        except FileNotFoundError:  # a newer one took its place just now
-            data = None
-        if path is None or data is None:
+        workspace = Workspace(self.server.folder.parent)
+        found = self._picture() or found_viewer_file(workspace, self.path)
+        if found is None:
             self.send_error(HTTPStatus.NOT_FOUND, explain="Not kept any more, or never there.")
             return None
+        data, kind = found
         self.send_response(HTTPStatus.OK)
-        self.send_header("Content-Type", _KINDS[path.suffix])
+        self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(data)))
-        self.send_header("X-Content-Type-Options", "nosniff")
+        for name, value in HEADERS.items():
+            self.send_header(name, value)
         self.end_headers()
         return data
+
+    def _picture(self) -> tuple[bytes, str] | None:
+        path = found_picture(self.server.folder, self.path)
+        try:
+            return (path.read_bytes(), _KINDS[path.suffix]) if path else None
+        except FileNotFoundError:  # a newer one took its place just now
+            return None
 
     def log_message(self, format: str, *arguments: object) -> None:
         """Say nothing: the terminal is the web UI's."""

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from assets_defs.workspace import CHECKOUT
+from assets_defs.picture_links import HOST
+from assets_defs.viewer_files import HEADERS, PAGE_FILES, VIEWER
 from storage.versions import Slot, VersionedStore
 from tsuya.console import SetUpError
 from tsuya.keys import parse_key
@@ -30,22 +31,6 @@ if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.requests import Request
     from starlette.responses import Response
-
-HOST = "127.0.0.1"
-VIEWER = CHECKOUT / "viewer" / "dist"
-"""The built page."""
-PAGE_FILES = ("index.html", "viewer.js", "viewer.css")
-HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-        "connect-src 'self' blob: data:; worker-src blob:; base-uri 'none'; form-action 'none'; "
-        "frame-ancestors 'none'"
-    ),
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-}
 
 
 @dataclass(frozen=True)
@@ -106,7 +91,7 @@ def view_app(
     reading = threading.Lock()
 
     def show_file(request: Request) -> Response:
-        name = request.path_params.get("name", PAGE_FILES[0])
+        name = request.path_params.get("name", next(iter(PAGE_FILES)))
         if name not in PAGE_FILES:
             raise HTTPException(404)
         return FileResponse(page / name, headers=HEADERS)
