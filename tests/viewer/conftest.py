@@ -14,6 +14,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -24,6 +25,8 @@ from numpy.typing import NDArray
 
 from assets_defs.workspace import CHECKOUT
 from storage.packages import Package
+from storage.packages.conformance import SMALL, small_contents
+from storage.packages.writing import Figure, PaperFigure, write_package
 from storage.versions import VersionedStore
 from tsuya.view_server import HOST, offered_packages, view_app
 
@@ -192,3 +195,39 @@ def open_viewer(chromium: Any, served: Callable[..., str]) -> Iterator[Callable[
         said = [text for text in viewer.said if allowed is None or allowed not in text]
         assert said == []
         assert viewer.hosts == set()
+
+
+# ---- a package of no system ------------------------------------------------------------------
+
+CHECKS = {"seams": {"passed": True, "figure": 0.25}, "holes": {"passed": False, "figure": 3}}
+LINEAGE = {"asset": "made", "partition": "one", "version": "v7", "content": "c", "checks": CHECKS}
+FIGURES = (
+    Figure("RMSE", 0.03, "1", PaperFigure(0.02, "table 2, knit")),
+    Figure("size", 1234.0, "bytes"),
+)
+
+
+@pytest.fixture(scope="session")
+def content() -> bytes:
+    """A package of the conformance suite, with figures and lineage."""
+    contents = replace(small_contents(), figures=FIGURES, lineage=(LINEAGE,))
+    return write_package(SMALL, contents)
+
+
+@pytest.fixture
+def small(tmp_path: Path, content: bytes) -> Path:
+    """Its file."""
+    path = tmp_path / "small.tsuya"
+    path.write_bytes(content)
+    return path
+
+
+@pytest.fixture
+def open_small(open_viewer: Callable[..., ViewerPage]) -> Callable[..., ViewerPage]:
+    """``open_viewer`` with a live view of the conformance suite's packages."""
+    view = Path(__file__).with_name("conformance_view.js").read_text()
+
+    def open_page(*paths: Path, script: str = "", **options: Any) -> ViewerPage:
+        return open_viewer(*paths, script=view + script, **options)
+
+    return open_page

@@ -9,6 +9,7 @@ import { partCanvas } from "./pictures";
 import { sentenceOf } from "./sentences";
 
 const FIGURES_SHOWN = 3;
+const NOT_SHOWN = "what cannot be shown";
 
 /** The gallery; `done` is settled when each package has been read, or has said why not. */
 export function gallery(listed: readonly Listed[]): { element: HTMLElement; done: Promise<void> } {
@@ -21,7 +22,7 @@ export function gallery(listed: readonly Listed[]): { element: HTMLElement; done
     groups,
     table,
   );
-  const done = Promise.all(listed.map(async (each) => fill(cardOf(each), each, groups, table)));
+  const done = Promise.all(listed.map(async (each, place) => fill(numbered(cardOf(each), place), each, groups, table)));
   return { element: page, done: done.then(() => undefined) };
 }
 
@@ -32,17 +33,29 @@ function cardOf({ key }: Listed): HTMLAnchorElement {
 async function fill(card: HTMLAnchorElement, listed: Listed, groups: HTMLElement, table: HTMLElement): Promise<void> {
   try {
     const pkg = await opened(listed);
-    group(groups, pkg.meta.system).append(card);
+    insert(group(groups, pkg.meta.system), card);
     await showPackage(card, pkg);
     if (pkg.meta.figures.length) {
       table.hidden = false;
-      table.append(element("h3", {}, pkg.meta.title), figureTable(pkg.meta.figures));
+      const figures = element("div", {}, element("h3", {}, pkg.meta.title), figureTable(pkg.meta.figures));
+      insert(table, numbered(figures, Number(card.dataset.place)));
     }
   } catch (error) {
-    group(groups, "not shown").append(card);
+    insert(group(groups, NOT_SHOWN), card);
     card.removeAttribute("href");
     card.replaceChildren(element("p", { class: "broken", role: "alert" }, sentenceOf(error)));
   }
+}
+
+/** An element that knows its place: packages are read in any order, and shown in that of the list. */
+function numbered<T extends HTMLElement>(made: T, place: number): T {
+  made.dataset.place = String(place);
+  return made;
+}
+
+function insert(parent: HTMLElement, made: HTMLElement): void {
+  const isAfter = (child: Element) => Number((child as HTMLElement).dataset.place ?? -1) > Number(made.dataset.place);
+  parent.insertBefore(made, [...parent.children].find(isAfter) ?? null);
 }
 
 function group(groups: HTMLElement, system: string): HTMLElement {
