@@ -20,7 +20,7 @@ Open = Callable[..., Any]
 
 def shown_colour(viewer: Any) -> tuple[int, int, int]:
     """The colour in the middle of the canvas, once it is still."""
-    viewer.page.wait_for_timeout(400)
+    viewer.wait_for("() => window.tsuya.live.still")
     box = viewer.page.locator("canvas.live").bounding_box()
     coded = np.frombuffer(viewer.page.screenshot(), np.uint8)
     picture = cv2.imdecode(coded, cv2.IMREAD_COLOR)[..., ::-1]

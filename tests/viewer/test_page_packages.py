@@ -56,7 +56,7 @@ def test_a_frame_of_the_stage_stands_to_the_right_of_the_line(
     viewer.page.locator(".comparison").select_option(label="the stage's frame: front")
     box = viewer.page.locator(".frame").bounding_box()
     assert box["width"] / box["height"] == pytest.approx(1, abs=0.01)  # as the view's picture
-    viewer.page.wait_for_timeout(500)
+    viewer.wait_for("() => window.tsuya.live.still")
     coded = np.frombuffer(viewer.page.screenshot(), np.uint8)
     picture = cv2.imdecode(coded, cv2.IMREAD_COLOR)
     row = picture[int(box["y"] + box["height"] * 0.7)]
@@ -83,7 +83,7 @@ def test_two_packages_are_compared(small: Path, tmp_path: Path, open_small: Open
     viewer.page.wait_for_selector(".line")
     viewer.evaluate("() => window.tsuya.live.other.setState({ red: 0.9 })")
     viewer.evaluate("() => window.tsuya.live.change()")
-    viewer.page.wait_for_timeout(500)
+    viewer.wait_for("() => window.tsuya.live.still")
     coded = np.frombuffer(viewer.page.screenshot(), np.uint8)
     row = cv2.imdecode(coded, cv2.IMREAD_COLOR)[100]
     assert row[450, 2] > row[350, 2]

@@ -38,6 +38,7 @@ export class Live {
   private scale = 1;
   private changed = 0;
   private generation = 0;
+  private refined = -1;
   private awake: (() => void) | undefined;
   private ended = false;
   private warm = false;
@@ -50,6 +51,11 @@ export class Live {
     this.camera = camera;
     this.panes.push({ view, frames: new Frames(renderer) });
     void this.run();
+  }
+
+  /** Whether the picture has all of its samples. */
+  get still(): boolean {
+    return this.refined === this.generation;
   }
 
   /** The view that the controls belong to. */
@@ -169,6 +175,7 @@ export class Live {
       for (let sample = 0; sample < SAMPLES_A_SIDE ** 2; sample++) {
         if (!(await this.drawSample(sample, generation))) return;
       }
+      this.refined = generation;
     } catch (error) {
       this.onError(error);
     }
