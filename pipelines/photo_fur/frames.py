@@ -66,7 +66,7 @@ def draw_frames(
     """
     image = fur_texture(photograph, mesh.layers, tails=tails)
     height, width = size
-    cameras = _cameras(views, mesh.vertices.reshape(-1, 3), width / height)
+    cameras = view_cameras(views, mesh.vertices.reshape(-1, 3), width / height)
     pictures, coverage = [], []
     for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
         if progress is not None:
@@ -113,8 +113,11 @@ def stretched_to_photograph(mesh: ShellMesh, photograph: FurPhotograph) -> Shell
     return mesh._replace(vertices=vertices.astype(np.float32))
 
 
-def _cameras(views: Sequence[View], points: NDArray[np.float32], aspect: float) -> list[Camera]:
-    """One camera a view; all that are perspective stand equally far away."""
+def view_cameras(views: Sequence[View], points: NDArray[np.float32], aspect: float) -> list[Camera]:
+    """One camera a view, which has all points (n, 3) in a picture of width / height ``aspect``.
+
+    All that are perspective stand equally far away.
+    """
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = ((low + high) / 2).tolist()
     lens = {"view_angle": _VIEW_ANGLE}

@@ -121,4 +121,12 @@ FUR_FRAMES = Schema(
     },
 )
 
-SCHEMAS = (FUR_PHOTO, ATTENUATION, SHELL_STACK, SHELL_MESH, FUR_FRAMES)
+FUR_PACKAGE = Schema(
+    _SYSTEM,
+    "fur_package",
+    1,
+    "The fur as a runtime package (docs/packages.md).",
+    {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
+)
+
+SCHEMAS = (FUR_PHOTO, ATTENUATION, SHELL_STACK, SHELL_MESH, FUR_FRAMES, FUR_PACKAGE)

@@ -8,15 +8,7 @@ in vec2 uvOut;
 flat in float layerOut;
 
 vec3 surfaceColour() {
-  vec4 texel = texture(photograph, uvOut);
-  float code = depthCode(texel.a);
-  if (isBelowLayer(code, layerOut, CODE_STEPS)) discard;
-  if (isAboveLayer(code, layerOut, CODE_STEPS)) {
-#if COLUMNS
-    texel.rgb *= darkening(code, layerOut, CODE_STEPS, DECAY);
-#else
-    discard;
-#endif
-  }
-  return texel.rgb;
+  vec4 hair = hairInLayer(texture(photograph, uvOut), layerOut, CODE_STEPS, DECAY, COLUMNS == 1);
+  if (hair.a == 0.0) discard;
+  return hair.rgb;
 }

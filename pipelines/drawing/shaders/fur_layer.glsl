@@ -24,3 +24,13 @@ float darkening(float code, float layer, float codeSteps, float decay) {
   float own = floor(code / codeSteps) + 1.0;
   return exp(decay * (own - layer));
 }
+
+// What a layer shows of a texel, linear colours and the depth code in alpha; alpha is 0 where no
+// hair stands there, else 1. In columns a hair stands in all layers below its own, too.
+vec4 hairInLayer(vec4 texel, float layer, float codeSteps, float decay, bool columns) {
+  float code = depthCode(texel.a);
+  if (isBelowLayer(code, layer, codeSteps)) return vec4(0.0);
+  if (!isAboveLayer(code, layer, codeSteps)) return vec4(texel.rgb, 1.0);
+  if (!columns) return vec4(0.0);
+  return vec4(texel.rgb * darkening(code, layer, codeSteps, decay), 1.0);
+}

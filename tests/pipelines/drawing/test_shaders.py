@@ -86,6 +86,15 @@ _TEXTURED: dict[str, Any] = {
     "LEAST_SLOPE": 0.05,
     "MOST_SPECULAR": 0.99,
 }
+_FUR_SHELL: dict[str, Any] = {
+    "CODE_STEPS": 25.0,
+    "DECAY": 0.3,
+    "THICKNESS": 0.1,
+    "LAYERS": 10.0,
+    "HEADLIGHT": 0.4,
+    "LAMP": 0.8,
+    "LAMP_TOWARDS": [0.0, 0.6, 0.8],
+}
 _GRID: dict[str, Any] = {
     "GRID_START": [0.05, 0.02],
     "GRID_END": [1.0, 0.99],
@@ -94,6 +103,7 @@ _GRID: dict[str, Any] = {
 STAGES: list[tuple[str, dict[str, Any]]] = [
     ("painted", {}),
     *(("fur", {"CODE_STEPS": 25.0, "DECAY": 0.3, "COLUMNS": columns}) for columns in (True, False)),
+    *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
     ("scratched_glass", _GLASS),
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
     ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
