@@ -72,7 +72,11 @@ def _tile_error(version: StoredVersion) -> float:
         return 255.0
     for tile in tiles:
         headers = tile.headers.reshape(-1, 5, 4)[: len(tile.rows)]
-        stored = (billboards.centre, billboards.half_s, billboards.half_t)
+        stored: tuple[NDArray[np.floating[Any]], ...] = (
+            billboards.centre,
+            billboards.half_s,
+            billboards.half_t,
+        )
         for texel, values in enumerate(stored):
             if not np.array_equal(headers[:, texel, :3], values[tile.rows].astype(np.float32)):
                 return 255.0

@@ -175,7 +175,11 @@ def _standing(header: NDArray[np.float32], view: int) -> NDArray[np.float32]:
 def tile_textures(tile: LiveTile) -> dict[str, NDArray[Any]]:
     """A tile's arrays as textures (1, y, x, 4), row 0 at t = 0; none of an atlas without planes."""
     page = tile.page
-    made = {"headers": tile.headers, "views": page.views, "masks": page.masks}
+    made: dict[str, NDArray[Any]] = {
+        "headers": tile.headers,
+        "views": page.views,
+        "masks": page.masks,
+    }
     for name, atlas in (("detail", page.detail), ("tint", page.tint)):
         if atlas.most_tiles:
             made |= {name: atlas.texels, f"{name}_scales": atlas.scales}
@@ -193,12 +197,12 @@ def tile_of(
     headers = np.asarray(textures["headers"][0], np.float32)
     records = headers.reshape(-1, 5, 4)[: len(rows), 3:]
     codes = records[:, 1, 2].astype(np.int64)
-    atlases = [
+    detail, tint = (
         _atlas(textures, name, side, int((codes >> shift & 63).max()))
         for name, side, shift in (("detail", sides[0], 0), ("tint", sides[1], 6))
-    ]
+    )
     views, masks = (np.asarray(textures[name][0], np.uint8) for name in ("views", "masks"))
-    page = Page(np.arange(len(rows)), *atlases, views, masks, records, 0, 0)
+    page = Page(np.arange(len(rows)), detail, tint, views, masks, records, 0, 0)
     return LiveTile(np.asarray(rows, np.int64), page, headers, stretch, box)
 
 

@@ -25,13 +25,13 @@ d + t): (mean of Y, Co, Cg; direction), then d texels of detail's weights and t 
 **Colour** in codes: mean (128 less for Co and Cg) + the sum over the tiles' four channels of scale
 x (weight - 128) / 127 x (sample - 128) / 127. Tiles have `detail_side` and `tint_side` texels;
 those of less than 32 are sampled at the middles of the texture's texels and interpolated between
-these. Slots of tint from channel 2's first on are Cg, those before are Co. R = Y + Co - Cg, G = Y + Cg,
-B = Y - Co - Cg; these are sRGB codes. Where the mask's bits (32 x 32, a texel a row, red first, its
-highest bit leftmost), interpolated between the middles of texels, are below 0.5 nothing is drawn.
-Behind all is the sky. `pipelines/drawing/shaders/street_*.glsl` does all of it.
+these. Slots of tint from channel 2's first on are Cg, those before are Co. R = Y + Co - Cg,
+G = Y + Cg, B = Y - Co - Cg; these are sRGB codes. Where the mask's bits (32 x 32, a texel a row,
+red first, its highest bit leftmost), interpolated between the middles of texels, are below 0.5
+nothing is drawn. Behind all is the sky. `pipelines/drawing/shaders/street_*.glsl` does all of it.
 """
 
-_TILE = {
+_TILE: dict[str, ArrayPart | TexturesPart] = {
     "billboard": ArrayPart(("billboard",), "uint32", "1", "Which of the street's each one is"),
     "headers": TexturesPart(
         "Where billboards stand and where their textures lie, five texels each",
