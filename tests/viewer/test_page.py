@@ -62,9 +62,9 @@ def test_a_page_opens_from_disk(
 @pytest.mark.slow
 def test_the_address_holds_the_view(small: Path, open_small: Open) -> None:
     first = open_small(small).ready()
-    first.page.locator("input[name=red]").fill("0.75")
     first.page.locator("canvas.live").focus()
     first.page.keyboard.press("ArrowRight")
+    first.page.locator("input[name=red]").fill("0.75")
     first.wait_for("() => location.hash.includes('0.75')")
     fragment = first.evaluate("() => location.hash")
     assert parse_qs(fragment[1:])["package"] == ["small.tsuya"]

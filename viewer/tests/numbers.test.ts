@@ -15,4 +15,6 @@ it("numbers are shown with four digits", () => {
   expect(shownNumber(1e-9)).toBe("1.000e-9");
   expect(withUnits(2.5, "dB")).toBe("2.5 dB");
   expect(withUnits(2.5, "1")).toBe("2.5");
+  expect(withUnits(281_000_000, "byte")).toBe("281 MB");
+  expect(withUnits(999, "bytes")).toBe("999 bytes");
 });

@@ -50,7 +50,13 @@ export function shownNumber(value: number): string {
   return text.includes("e") ? text : String(Number(text));
 }
 
-/** A number with its units, which are left out where they are "1". */
+/** A number with its units, which are left out where they are "1"; bytes are told in kB, MB or GB. */
 export function withUnits(value: number, units: string | undefined): string {
+  if (units === "byte" || units === "bytes") return shownBytes(value);
   return units && units !== "1" ? `${shownNumber(value)} ${units}` : shownNumber(value);
+}
+
+function shownBytes(value: number): string {
+  const power = Math.min(3, Math.floor(Math.log10(Math.max(value, 1)) / 3));
+  return `${shownNumber(value / 1000 ** power)} ${["bytes", "kB", "MB", "GB"][power]}`;
 }

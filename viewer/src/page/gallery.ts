@@ -3,84 +3,65 @@
 import type { Package } from "../package/package";
 import { written } from "./address";
 import { figureTable } from "./drawer";
-import { element } from "./elements";
+import { element, withUnits } from "./elements";
 import { opened, type Listed } from "./packages";
 import { partCanvas } from "./pictures";
 import { sentenceOf } from "./sentences";
 
 const FIGURES_SHOWN = 3;
-const NOT_SHOWN = "what cannot be shown";
 
 /** The gallery; `done` is settled when each package has been read, or has said why not. */
 export function gallery(listed: readonly Listed[]): { element: HTMLElement; done: Promise<void> } {
-  const groups = element("div", { class: "groups" });
+  const cards = element("div", { class: "cards" });
   const table = element("section", { class: "all-figures", hidden: true }, element("h2", {}, "Figures"));
   const page = element(
     "main",
     { class: "gallery" },
     element("header", {}, element("h1", {}, "Tsuya"), element("p", {}, "Measured appearance, live in the browser.")),
-    groups,
+    cards,
     table,
   );
-  const done = Promise.all(listed.map(async (each, place) => fill(numbered(cardOf(each), place), each, groups, table)));
+  const done = Promise.all(listed.map(async (each, place) => fill(each, String(place).padStart(6, "0"), cards, table)));
   return { element: page, done: done.then(() => undefined) };
 }
 
-function cardOf({ key }: Listed): HTMLAnchorElement {
-  return element("a", { class: "card", href: written({ key }) }, element("div", { class: "poster" }));
-}
-
-async function fill(card: HTMLAnchorElement, listed: Listed, groups: HTMLElement, table: HTMLElement): Promise<void> {
+/** Reads a package and puts its card, and its figures, in their place: by system, then as listed. */
+async function fill(listed: Listed, place: string, cards: HTMLElement, table: HTMLElement): Promise<void> {
+  const card = element("a", { class: "card", href: written({ key: listed.key }) }, element("div", { class: "poster" }));
   try {
     const pkg = await opened(listed);
-    insert(group(groups, pkg.meta.system), card);
+    const { system, title, figures } = pkg.meta;
+    insert(cards, card, `${system} ${place}`);
     await showPackage(card, pkg);
-    if (pkg.meta.figures.length) {
+    if (figures.length) {
       table.hidden = false;
-      const figures = element("div", {}, element("h3", {}, pkg.meta.title), figureTable(pkg.meta.figures));
-      insert(table, numbered(figures, Number(card.dataset.place)));
+      insert(table, element("div", {}, element("h3", {}, title), figureTable(figures)), `${system} ${place}`);
     }
   } catch (error) {
-    insert(group(groups, NOT_SHOWN), card);
     card.removeAttribute("href");
     card.replaceChildren(element("p", { class: "broken", role: "alert" }, sentenceOf(error)));
+    insert(cards, card, `~ ${place}`); // behind all systems
   }
 }
 
-/** An element that knows its place: packages are read in any order, and shown in that of the list. */
-function numbered<T extends HTMLElement>(made: T, place: number): T {
-  made.dataset.place = String(place);
-  return made;
-}
-
-function insert(parent: HTMLElement, made: HTMLElement): void {
-  const isAfter = (child: Element) => Number((child as HTMLElement).dataset.place ?? -1) > Number(made.dataset.place);
+/** Packages are read in any order, and shown in one. */
+function insert(parent: HTMLElement, made: HTMLElement, order: string): void {
+  made.dataset.order = order;
+  const isAfter = (child: Element) => ((child as HTMLElement).dataset.order ?? "") > order;
   parent.insertBefore(made, [...parent.children].find(isAfter) ?? null);
 }
 
-function group(groups: HTMLElement, system: string): HTMLElement {
-  const name = system.replaceAll("_", " ");
-  const found = [...groups.children].find((child) => (child as HTMLElement).dataset.system === system);
-  if (found) return found.querySelector(".cards") as HTMLElement;
-  const cards = element("div", { class: "cards" });
-  const made = element("section", {}, element("h2", {}, name), cards);
-  made.dataset.system = system;
-  const after = [...groups.children].find((child) => ((child as HTMLElement).dataset.system ?? "") > system);
-  groups.insertBefore(made, after ?? null);
-  return cards;
-}
-
 async function showPackage(card: HTMLAnchorElement, pkg: Package): Promise<void> {
-  const { title, figures, source } = pkg.meta;
+  const { system, title, figures, source } = pkg.meta;
   const picture = card.querySelector(".poster") as HTMLElement;
   const facts = figures.slice(0, FIGURES_SHOWN).map(({ name, value, units, paper }) => {
-    const beside = paper ? element("small", {}, ` paper ${Number(paper.value.toPrecision(3))}`) : "";
-    const shown = units === "1" ? "" : ` ${units}`;
-    return element("li", {}, element("span", {}, name), element("b", {}, `${Number(value.toPrecision(3))}${shown}`, beside));
+    const beside = paper ? element("small", {}, ` paper ${withUnits(paper.value, units)}`) : "";
+    return element("li", {}, element("span", {}, name), element("b", {}, withUnits(value, units), beside));
   });
   card.append(
+    element("small", {}, system.replaceAll("_", " ")),
     element("h3", {}, title),
-    element("p", {}, source.map(({ name, licence }) => `${name} (${licence})`).join(", ")),
+    element("p", {}, source.map(({ name }) => name).join(", ")),
     element("ul", {}, ...facts),
   );
   const [poster, input] = await Promise.all([

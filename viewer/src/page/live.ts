@@ -14,6 +14,8 @@ const STRIP = 60;
 /** Milliseconds without a change after which a picture is still. */
 const STILL = 180;
 const LOWEST_SCALE = 0.2;
+/** Of the first frame, before it is known how long one takes. */
+const FIRST_SCALE = 0.35;
 /** Samples of a refined pixel lie on a grid of so many a side. */
 const SAMPLES_A_SIDE = 4;
 
@@ -35,7 +37,7 @@ export class Live {
   onError: (error: unknown) => void = () => {};
 
   private readonly panes: Pane[] = [];
-  private scale = 1;
+  private scale = FIRST_SCALE;
   private changed = 0;
   private generation = 0;
   private refined = -1;

@@ -76,7 +76,7 @@ export class Viewing {
     this.live = new Live(renderer, view, this.firstCamera(view));
     requester.change = () => this.live.change();
     this.first = { camera: this.live.camera, state: view.state() };
-    if (view.navigation === "drive") this.element.append(driveButtons(canvas));
+    if (view.navigation === "drive") this.frame.append(driveButtons(canvas));
     this.endNavigation = navigate(canvas, this.live, {
       direction: (event) => this.turnedDirection(event),
       moved: () => this.changed(),
