@@ -97,7 +97,7 @@ class LitView implements LiveView {
   readonly navigation = "orbit";
   readonly bounds: Bounds = { centre: [0, 0, 0], radius: 1 };
   readonly home?: Camera;
-  private readonly settings: LitState = { turn: 0, shadows: true, clusters: false, behind: true, exposure: 0 };
+  private readonly settings: LitState = { turn: 0, shadows: true, clusters: false, behind: false, exposure: 0 };
   private readonly scene = new THREE.Scene();
   private readonly parts: Surface[];
   private readonly backdrop = new Backdrop();
