@@ -61,7 +61,7 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
         "table": table["rho"].values.astype(np.float16),
         "leaning": np.array(rows, np.float32),
         "angles": layers["angle"].values,
-        "coverage": np.floor(255.0 * layers["coverage"].values + 0.5).astype(np.uint8)[..., None],
+        "coverage": np.round(255.0 * layers["coverage"].values).astype(np.uint8)[..., None],
         "object": _expected_mesh(version.input("glass_object")),
         "poster": frames["frames"].values[0],
     }
@@ -272,6 +272,7 @@ class _Glass:
         state = {
             "environment": self.name,
             "turn": 0.0,
+            "brightness": 1.0,
             "tilt": 0.0,
             "swing": 0.0,
             "coverage": 1.0,

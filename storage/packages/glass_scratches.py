@@ -39,7 +39,8 @@ scratches by coverage.
 **A lamp** beside the environment, where a view's state has `lamp` > 0: it lies towards `light`, its
 radiance rises from 0 to full between the two cosines of `lamp_edge`; its irradiance where it falls
 straight is `lamp` times π times the environment's mean luminance, in the colour `lamp_colour`. It
-is one more light, and smooth glass shows it; nothing of it comes through.
+is one more light, and smooth glass shows it. Where it lies behind the face, max(-N·light, 0) / π of
+its irradiance comes through scratches, beside the environment's mean.
 
 Radiance times `exposure` is what the reference pictures show.
 """

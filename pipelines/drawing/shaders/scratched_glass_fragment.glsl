@@ -1,15 +1,14 @@
-// Scratched glass in its environment: one reflection and one refraction of it, and LAYERS of
+// Scratched glass in its surroundings: one reflection and one refraction of them, and LAYERS of
 // scratches, the directions of which are ANGLES, lit by LIGHTS lights. All directions are those of
-// the glass; TO_SKY turns them into the environment's. Beside the environment there is a lamp, of
-// which LIGHTS has a light. COVERED_A and COVERED_B multiply the layers' coverage, STRENGTH what
-// light meets of it.
+// the glass; TO_SKY turns them into the environment's, which BRIGHTNESS multiplies. The lamp beside
+// it is one of LIGHTS, and shines through scratches from behind. COVERED_A and COVERED_B multiply
+// the layers' coverage; STRENGTH is the share of what they cover that counts.
 
 #include "pi.glsl"
 #include "box_projection.glsl"
-#include "equirectangular.glsl"
-#include "round_lamp.glsl"
 #include "schlick.glsl"
 #include "scratch_table.glsl"
+#include "surroundings.glsl"
 
 uniform sampler2D sky;
 uniform sampler2D lights;
@@ -24,9 +23,8 @@ in vec3 placeOut;
 const float angles[LAYERS] = float[LAYERS](ANGLES);
 
 vec3 skyAlong(vec3 direction) {
-  vec2 place = equirectangularPlace(mat3(TO_SKY) * direction);
-  return textureLod(sky, place, 0.0).rgb
-       + roundLamp(direction, vec3(LAMP), vec2(LAMP_EDGE), vec3(LAMP_RADIANCE));
+  return surroundings(sky, mat3(TO_SKY), BRIGHTNESS, vec3(LAMP), vec2(LAMP_EDGE),
+                      vec3(LAMP_RADIANCE), direction);
 }
 
 // What smooth glass shows: light from behind is bent half as much as by one surface, for it leaves
@@ -46,6 +44,8 @@ vec3 surfaceColour() {
   float side = dot(normal, view) > 0.0 ? 1.0 : -1.0;
   normal *= side;
   vec3 seen = smoothGlass(view, normal);
+  vec3 through = vec3(THROUGH) + vec3(LAMP_RADIANCE) * roundLampSteradians(vec2(LAMP_EDGE))
+                               * max(-dot(vec3(LAMP), normal), 0.0) / PI;
 
   vec3 share = axisShares(facingOut);
   vec3 scattered = vec3(0.0);
@@ -67,7 +67,7 @@ vec3 surfaceColour() {
       float factor = reflectedShare(leaning, place, dot(view, along));
       vec3 lit = scatteredLight(table, lights, LIGHTS, place, across, normal);
       lit *= 2.0 / (PI * PI) * factor;
-      scattered += part * (lit + (1.0 - factor) * vec3(THROUGH));
+      scattered += part * (lit + (1.0 - factor) * through);
       covered += part;
       uncovered *= 1.0 - part;
     }

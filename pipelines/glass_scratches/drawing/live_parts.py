@@ -17,8 +17,8 @@ from pipelines.light.environment_maps import Radiance, check_environment
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 LARGEST_HALF = float(np.finfo(np.float16).max)
-_LAMP_AT = (-0.48, -0.64, 0.6)
-"""Behind the camera's shoulder: a lamp is not seen behind the glass, only on it and in it."""
+_LAMP = Lamp((-0.8, 0.48, 0.36), 3.0)
+"""Behind the plate and beside the picture, in which a lamp would show only on and in the glass."""
 
 
 def half_radiance(radiance: Radiance, rows: int) -> NDArray[np.float16]:
@@ -70,7 +70,7 @@ def reference_views(
 ) -> tuple[ReferenceView, ...]:
     """The object from far and from close, and close with a lamp beside the environment."""
     far, close = object_cameras(solid)
-    wanted = (("far", far, None), ("close", close, None), ("lamp", close, Lamp(_LAMP_AT, 4.0)))
+    wanted = (("far", far, None), ("close", close, None), ("lamp", close, _LAMP))
     return tuple(
         ReferenceView(
             name,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 MOST_LAYERS = 8
 """Two textures of four channels."""
 LIGHTS = 64
-LAMP_EDGE = (math.cos(math.radians(5.0)), math.cos(math.radians(3.0)))
+LAMP_EDGE = (math.cos(math.radians(2.5)), math.cos(math.radians(1.2)))
 """Cosines to the middle of a lamp between which its radiance rises from nothing to all."""
 LAMP_COLOUR = (1.0, 0.93, 0.8)
 
@@ -115,6 +115,7 @@ class ScratchedActor:
                 TILE=float(self._tile),
                 THROUGH=through,
                 TO_SKY=np.eye(3).ravel().tolist(),
+                BRIGHTNESS=1.0,
                 LAMP=list(lamp.towards if lamp else (0.0, 0.0, 1.0)),
                 LAMP_EDGE=list(LAMP_EDGE),
                 LAMP_RADIANCE=glow.tolist(),

@@ -27,7 +27,7 @@ from pipelines.street_billboards.textures.view_directions import fan_position
 
 FILES = sorted(path.name for path in SHADERS.iterdir())
 FUNCTIONS = [name for name in FILES if not name.endswith(("_vertex.glsl", "_fragment.glsl"))]
-FOR_OTHERS = {"octahedral.glsl", "stereographic.glsl"}
+FOR_OTHERS = {"octahedral.glsl"}
 """No picture of the stage needs them: they are for who draws without it, and tested here."""
 
 _STREET: dict[str, Any] = {
@@ -100,8 +100,16 @@ _GRID: dict[str, Any] = {
     "GRID_END": [1.0, 0.99],
     "GRID_STEPS": [12.0, 5.0],
 }
+_CLOTH: dict[str, Any] = {
+    "TEXELS": [48, 32],
+    "TILES": 4.0,
+    "LIGHT": [0.0, -1.0, 0.0],
+    "EYE": [1.0, -4.0, 0.5],
+    "SCALE": 1.5,
+}
 STAGES: list[tuple[str, dict[str, Any]]] = [
     ("painted", {}),
+    *(("btf_cloth", _CLOTH | {"SHARED": shared}) for shared in (True, False)),
     *(("fur", {"CODE_STEPS": 25.0, "DECAY": 0.3, "COLUMNS": columns}) for columns in (True, False)),
     *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
     ("scratched_glass", _GLASS),

@@ -1,35 +1,37 @@
 /** Scratched glass in its environment, tilted under a lamp. */
 
 import * as THREE from "three";
-import type { Camera } from "../drawing/camera";
+import { orbit, type Camera } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
-import type { Package } from "../package/package";
-import { Environment, lampRadiance, lampSteradians, packedEnvironment } from "./glass_scratches/environment";
+import { Environment, lampRadiance, lampSteradians } from "./glass_scratches/environment";
 import { ENDINGS, readEnvironment } from "./glass_scratches/environment_file";
+import { Environments } from "./glass_scratches/environments";
 import { glassOf, type Glass } from "./glass_scratches/glass";
 import { controlsOf, stateOf, withState, type Settings } from "./glass_scratches/state";
 import { Surroundings } from "./glass_scratches/surroundings";
 
-const PACKED = "environment_";
 /** The name of a person's own environment. */
 const DROPPED = "yours";
 /** An orthographic camera is as far away as the stage's, in distances to its target. */
 const FAR_AWAY = 1e4;
-const HOME_LAMP = 8;
-const HOME_LIGHT: [number, number, number] = [-0.48, -0.64, 0.6];
+/** A dark set: the lamps' room is dimmed, one of them stands behind the glass, the lamp beside it. */
+const DARK_SET = { turn: -84, brightness: 0.18, tilt: 14, lamp: 4 };
+const BRIGHT_SET = { turn: 0, brightness: 1, tilt: 0, lamp: 2 };
+const HOME_LIGHT: [number, number, number] = [0.64, 0.48, 0.6];
 const UP = new THREE.Vector3(0, 0, 1);
 
 class ScratchedGlass implements LiveView {
   readonly navigation = "orbit";
   readonly bounds: Bounds = { centre: [0, 0, 0], radius: 1 };
+  readonly home = orbit([0, 0, 0], 2.9, -75, 1, { view_angle: 36 });
   private readonly scene = new THREE.Scene();
   private readonly surroundings: Surroundings;
 
   constructor(
     private readonly context: Context,
     private readonly glass: Glass,
-    private readonly environments: Map<string, Environment>,
+    private readonly environments: Environments,
     private readonly edge: readonly number[],
     private readonly lampColour: readonly number[],
     private settings: Settings,
@@ -39,7 +41,7 @@ class ScratchedGlass implements LiveView {
   }
 
   get controls(): Control[] {
-    return controlsOf(this.settings, [...this.environments.keys()], (file) => this.take(file), ENDINGS);
+    return controlsOf(this.settings, this.environments.names, (file) => this.take(file), ENDINGS);
   }
 
   state(): State {
@@ -47,7 +49,11 @@ class ScratchedGlass implements LiveView {
   }
 
   setState(state: State): void {
-    this.settings = withState(this.settings, state, [...this.environments.keys()]);
+    this.settings = withState(this.settings, state, this.environments.names);
+  }
+
+  async update(): Promise<void> {
+    if (await this.environments.show(this.settings.environment)) this.context.requestDraw();
   }
 
   draw(renderer: THREE.WebGLRenderer, camera: Camera, width: number, height: number): void {
@@ -56,23 +62,17 @@ class ScratchedGlass implements LiveView {
   }
 
   figures(): Record<string, number | string> {
-    return { "exposure of the environment": Number(this.environment.exposure.toPrecision(4)) };
+    return { "exposure of the environment": Number(this.environments.shown.exposure.toPrecision(4)) };
   }
 
   dispose(): void {
     this.glass.surface.dispose();
     this.surroundings.dispose();
-    for (const environment of this.environments.values()) environment.dispose();
-  }
-
-  private get environment(): Environment {
-    return this.environments.get(this.settings.environment) as Environment;
+    this.environments.dispose();
   }
 
   private async take(file: File): Promise<void> {
-    const environment = new Environment(await readEnvironment(file));
-    this.environments.get(DROPPED)?.dispose();
-    this.environments.set(DROPPED, environment);
+    this.environments.add(DROPPED, new Environment(await readEnvironment(file)));
     this.settings = { ...this.settings, environment: DROPPED };
     this.context.requestDraw();
   }
@@ -87,20 +87,20 @@ class ScratchedGlass implements LiveView {
     const turned = new THREE.Quaternion().setFromAxisAngle(UP, THREE.MathUtils.degToRad(turn));
     const radiance = lampRadiance(lamp, this.edge, this.lampColour);
     const behind = this.surroundings.uniforms;
-    behind.sky.value = this.environment.texture;
+    behind.sky.value = this.environments.shown.texture;
     behind.brightness.value = brightness;
     behind.toSky.value.copy(matrix(turned.clone().invert()));
     behind.lamp.value.set(...light);
     behind.lampRadiance.value.set(...radiance);
     const shown = surface.uniforms;
-    shown.sky.value = this.environment.texture;
+    shown.sky.value = this.environments.shown.texture;
     shown.brightness.value = brightness;
     shown.toSky.value.copy(matrix(turned.clone().invert().multiply(surface.quaternion)));
     shown.lamp.value.set(...light).applyQuaternion(intoGlass);
     shown.lampRadiance.value.set(...radiance);
     shown.eye.value.copy(eyeOf(camera)).applyQuaternion(intoGlass);
     shown.tileSide.value = tile;
-    shown.through.value = brightness * this.environment.through;
+    shown.through.value = brightness * this.environments.shown.through;
     shown.strength.value = strength;
     shown.coveredA.value.fromArray(this.covered(0));
     shown.coveredB.value.fromArray(this.covered(4));
@@ -114,7 +114,7 @@ class ScratchedGlass implements LiveView {
 
   /** Lights in the texture, as the glass has them: powers in row 0, directions in row 1. */
   private writeLights(turn: THREE.Quaternion, lamp: THREE.Vector3, radiance: number[]): void {
-    const { power, towards } = this.environment.lights;
+    const { power, towards } = this.environments.shown.lights;
     const { brightness } = this.settings;
     const { data, width } = this.glass.lights.image as { data: Float32Array; width: number };
     const direction = new THREE.Vector3();
@@ -140,33 +140,20 @@ function eyeOf(camera: Camera): THREE.Vector3 {
   return position.sub(target).multiplyScalar(FAR_AWAY).add(target);
 }
 
-async function environmentsOf(pkg: Package): Promise<Map<string, Environment>> {
-  const own = pkg.parameter<string>("environment");
-  const found = Object.keys(pkg.meta.parts).filter((part) => part.startsWith(PACKED));
-  const names = found.map((part) => part.slice(PACKED.length)).sort((a, b) => Number(b === own) - Number(a === own));
-  const made = names.map(async (name): Promise<[string, Environment]> => {
-    const [{ height, data }, lights] = await Promise.all([pkg.picture(PACKED + name), pkg.floats(`lights_${name}`)]);
-    return [name, packedEnvironment(height, data, lights)];
-  });
-  return new Map(await Promise.all(made));
-}
-
 /** The system's live view. */
 const viewer: SystemViewer = {
   name: "glass_scratches",
   async make(pkg, context) {
     const edge = pkg.parameter<number[]>("lamp_edge");
-    const [glass, environments] = await Promise.all([glassOf(pkg, edge), environmentsOf(pkg)]);
+    const environment = pkg.parameter<string>("environment");
+    const [glass, environments] = await Promise.all([glassOf(pkg, edge), Environments.of(pkg, environment)]);
     return new ScratchedGlass(context, glass, environments, edge, pkg.parameter<number[]>("lamp_colour"), {
-      environment: pkg.parameter<string>("environment"),
-      turn: 0,
-      brightness: 1,
-      tilt: 0,
+      ...(environment === "lamps" ? DARK_SET : BRIGHT_SET),
+      environment,
       swing: 0,
       coverage: 1,
       strength: 1,
       tile: pkg.parameter("tile"),
-      lamp: HOME_LAMP,
       light: HOME_LIGHT,
       layers: Array.from({ length: glass.layers }, () => true),
     });

@@ -32,37 +32,41 @@ export function environmentOf({ width, height, data }: Colours, name: string): R
     throw new Error(`${name} is ${width} x ${height} pixels; expected an equirectangular picture, twice as wide as high.`);
   }
   const rows = Math.min(MOST_ROWS, height);
-  const kept = new Float32Array(rows * 2 * rows * 3);
-  const overlapOf = (n: number, from: number, to: number) => overlaps(n, from / to, from);
-  const across = Array.from({ length: 2 * rows }, (_, column) => overlapOf(column, width, 2 * rows));
-  let brightest = 0;
-  for (let row = 0; row < rows; row++) {
-    for (const [y, down] of overlapOf(row, height, rows)) {
-      for (let column = 0; column < 2 * rows; column++) {
-        const to = 3 * (row * 2 * rows + column);
-        for (const [x, along] of across[column]) {
-          for (let channel = 0; channel < 3; channel++) {
-            const value = data[4 * (y * width + x) + channel];
-            kept[to + channel] += down * along * Math.max(Number.isFinite(value) ? value : 0, 0);
-          }
-        }
-      }
-    }
-  }
-  for (const value of kept) brightest = Math.max(brightest, value);
-  if (brightest === 0) throw new Error(`${name} is all black; expected some light.`);
+  const narrow = averaged(light(data, 4), height, width, 2 * rows, 3);
+  const kept = averaged(narrow, 1, height, rows, 6 * rows);
+  if (!kept.some((value) => value > 0)) throw new Error(`${name} is all black; expected some light.`);
   return { height: rows, data: kept };
 }
 
-/** Pixels under the n-th of a coarser grid, and the share of it that each covers. */
-function overlaps(n: number, step: number, count: number): [number, number][] {
-  const [start, end] = [n * step, Math.min((n + 1) * step, count)];
-  const found: [number, number][] = [];
-  for (let pixel = Math.floor(start); pixel < end; pixel++) {
-    const share = (Math.min(end, pixel + 1) - Math.max(start, pixel)) / (end - start);
-    if (share > 1e-9) found.push([pixel, share]);
+/** Red, green and blue of colours with `channels` channels; what is no light is 0. */
+function light(colours: ArrayLike<number>, channels: number): Float32Array {
+  const kept = new Float32Array((colours.length / channels) * 3);
+  for (let from = 0, to = 0; to < kept.length; from += channels, to += 3) {
+    for (let channel = 0; channel < 3; channel++) {
+      const value = colours[from + channel];
+      kept[to + channel] = value > 0 && value < Infinity ? value : 0;
+    }
   }
-  return found;
+  return kept;
+}
+
+/** Values (lines, from, size) averaged to (lines, to, size), to <= from, each over its share. */
+function averaged(values: Float32Array, lines: number, from: number, to: number, size: number): Float32Array {
+  if (from === to) return values;
+  const kept = new Float32Array(lines * to * size);
+  const step = from / to;
+  for (let line = 0; line < lines; line++) {
+    for (let n = 0; n < to; n++) {
+      const [start, end] = [n * step, Math.min((n + 1) * step, from)];
+      const into = (line * to + n) * size;
+      for (let i = Math.floor(start); i < end; i++) {
+        const share = (Math.min(end, i + 1) - Math.max(start, i)) / (end - start);
+        const out = (line * from + i) * size;
+        for (let value = 0; value < size; value++) kept[into + value] += share * values[out + value];
+      }
+    }
+  }
+  return kept;
 }
 
 function radiancePicture(content: ArrayBuffer, name: string): Colours {

@@ -35,7 +35,7 @@ const RANGES: Record<string, [number, number]> = {
   coverage: [0, 4],
   strength: [0, 1],
   tile: [0.1, 4],
-  lamp: [0, 40],
+  lamp: [0, 12],
 };
 
 /** The controls, for environments by name. */
@@ -47,7 +47,7 @@ export function controlsOf(settings: Settings, environments: readonly string[], 
   const options = environments.map((value) => ({ value, label: value[0].toUpperCase() + value.slice(1) }));
   return [
     { kind: "direction", name: "light", label: "Lamp" },
-    slider("lamp", "Lamp's light", 0.5),
+    slider("lamp", "Lamp's light", 0.25),
     slider("tilt", "Tilt", 1, "°"),
     slider("swing", "Swing", 1, "°"),
     { kind: "choice", name: "environment", label: "Environment", options },

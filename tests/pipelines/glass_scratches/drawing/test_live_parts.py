@@ -1,0 +1,158 @@
+"""What a live picture of scratched glass is made of."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.drawing.colour import luminance
+from pipelines.geometry.solid_shapes import plate
+from pipelines.glass_scratches.drawing.frames import environment_exposure, object_cameras
+from pipelines.glass_scratches.drawing.live_parts import half_radiance, reference_views
+from pipelines.glass_scratches.drawing.stage_view import (
+    LAMP_COLOUR,
+    LAMP_EDGE,
+    Lamp,
+    ScratchedActor,
+    corners_apart,
+    draw_scratched,
+    environment_lights,
+    lamp_radiance,
+)
+from pipelines.glass_scratches.tables.fresnel import fresnel_factors
+from pipelines.light.built_in_environments import lamps, uniform
+from pipelines.light.environment_maps import solid_angles, texel_directions
+from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
+
+FIXTURE = Path(__file__).parents[4] / "viewer" / "tests" / "glass_scratches_lights.json"
+BINS = 16
+
+
+def lights_fixture() -> dict[str, Any]:
+    """An environment, its lights, a lamp: what the viewer's tests compare with."""
+    light = make_environment_sampler(np.round(lamps(16), 4))
+    (power, towards), through = environment_lights(light)
+    lamp = {
+        "edge": list(LAMP_EDGE),
+        "colour": list(LAMP_COLOUR),
+        "radiance": lamp_radiance(Lamp((0.0, 0.0, 1.0), 3.0), light).tolist(),
+    }
+    return {
+        "height": 16,
+        "radiance": [round(float(value), 4) for value in light.radiance.ravel()],
+        "power": [round(float(value), 7) for value in power.ravel()],
+        "towards": [round(float(value), 7) for value in towards.ravel()],
+        "through": through,
+        "exposure": environment_exposure(light),
+        "lamp": lamp,
+    }
+
+
+def test_the_viewers_values_are_todays() -> None:
+    """Written by ``python -m tests.pipelines.glass_scratches.drawing.test_live_parts``."""
+    stored, made = json.loads(FIXTURE.read_text()), lights_fixture()
+    assert stored.keys() == made.keys()
+    for name in ("radiance", "power", "towards", "through", "exposure"):
+        assert np.allclose(stored[name], made[name], rtol=1e-6, atol=1e-6), name
+    assert np.allclose(stored["lamp"]["radiance"], made["lamp"]["radiance"], rtol=1e-6)
+
+
+def test_an_environment_of_halfs_has_the_same_light() -> None:
+    radiance = lamps(64)
+    for rows in (64, 16):
+        halfs = half_radiance(radiance, rows)
+        assert halfs.dtype == np.float16
+        assert halfs.shape == (rows, 2 * rows, 3)
+        sums = [
+            (each.astype(np.float64) * solid_angles(len(each))[:, None, None]).sum()
+            for each in (radiance, halfs)
+        ]
+        assert np.isclose(*sums, rtol=0.02)
+
+
+def test_an_environment_too_bright_for_halfs_is_scaled_as_a_whole() -> None:
+    radiance = np.full((8, 16, 3), 2.0, np.float32)
+    radiance[2, 3] = 1e6
+    halfs = half_radiance(radiance, 8).astype(np.float64)
+    assert halfs.max() == 65504
+    assert np.isclose(halfs[0, 0, 0] / halfs.max(), 2e-6, rtol=1e-2)
+
+
+# ---- the lamp --------------------------------------------------------------------------------
+
+
+def test_a_lamps_irradiance_is_what_was_asked_for() -> None:
+    """Integrated over directions, texel by texel, over that of the even environment."""
+    light = make_environment_sampler(uniform(8, 3.0))
+    radiance = luminance(lamp_radiance(Lamp((0.0, 0.0, 1.0), 5.0), light))
+    cosine = texel_directions(4096)[:128, 0, 2]
+    shares = np.clip((cosine - LAMP_EDGE[0]) / (LAMP_EDGE[1] - LAMP_EDGE[0]), 0, 1)
+    steradians = (shares * cosine * solid_angles(4096)[:128] * 8192).sum()
+    assert np.isclose(radiance * steradians / (np.pi * 3.0), 5.0, rtol=2e-3)
+
+
+@pytest.fixture(scope="module")
+def rough() -> tuple[ScratchedActor, EnvironmentSampler]:
+    """A plate that one layer covers all over, in a dim even environment."""
+    actor = ScratchedActor(
+        plate(1.5, 1.1, 0.05),
+        np.ones((1, 8, 8), np.float32),
+        np.zeros(1),
+        np.ones((BINS, BINS)),
+        fresnel_factors(BINS, 1.5, "paper"),
+        index=1.5,
+        tile=1.0,
+    )
+    return actor, make_environment_sampler(uniform(8))
+
+
+def _middle(rough: tuple[ScratchedActor, EnvironmentSampler], lamp: Lamp | None) -> float:
+    actor, light = rough
+    camera = object_cameras(plate(1.5, 1.1, 0.05))[0]
+    drawn = draw_scratched(actor, light, camera, width=16, height=16, supersampling=1, lamp=lamp)
+    return float(luminance(drawn[8, 8, :3]))
+
+
+def test_a_lamp_behind_shines_through_as_an_even_wall_does(
+    rough: tuple[ScratchedActor, EnvironmentSampler],
+) -> None:
+    """Rough walls turn irradiance E into E / pi, but for the part F that they reflect."""
+    without = _middle(rough, None)
+    straight = _middle(rough, Lamp((0.0, 1.0, 0.0), 2.0)) - without
+    leaning = _middle(rough, Lamp((0.0, 0.5, 0.75**0.5), 2.0)) - without
+    assert np.isclose(straight, 2.0 * 0.96, rtol=0.01)
+    assert np.isclose(leaning, straight / 2, rtol=0.01)
+
+
+def test_a_lamp_in_front_is_reflected_by_the_table(
+    rough: tuple[ScratchedActor, EnvironmentSampler],
+) -> None:
+    """2 F / pi^2 rho E, rho = 1, F = 0.04 seen straight."""
+    lit = _middle(rough, Lamp((0.0, -1.0, 0.0), 2.0)) - _middle(rough, None)
+    assert np.isclose(lit, 2 * 0.04 / np.pi**2 * 2.0 * np.pi, rtol=0.03)
+
+
+def test_reference_views_differ_by_distance_and_by_the_lamp(
+    rough: tuple[ScratchedActor, EnvironmentSampler],
+) -> None:
+    far, close, lit = reference_views(plate(1.5, 1.1, 0.05), *rough, 24)
+    assert [view.name for view in (far, close, lit)] == ["far", "close", "lamp"]
+    assert close.camera == lit.camera
+    assert close.lamp is None
+    assert lit.frame.mean() > close.frame.mean() + 5
+    assert (far.frame != close.frame).any()
+
+
+def test_corners_apart_stand_outwards() -> None:
+    places, shading, facing = corners_apart(plate(1.5, 1.1, 0.05))
+    assert places.shape == shading.shape == facing.shape == (36, 3)
+    assert (np.einsum("ij,ij->i", places, facing) > 0).all()
+    assert np.allclose(np.linalg.norm(facing, axis=1), 1)
+
+
+if __name__ == "__main__":
+    FIXTURE.write_text(json.dumps(lights_fixture()) + "\n")

@@ -1,0 +1,99 @@
+import { describe, expect, it } from "vitest";
+import { Environment, lampRadiance, lampSteradians } from "../src/systems/glass_scratches/environment";
+import { environmentOf } from "../src/systems/glass_scratches/environment_file";
+import { drawnLights, LIGHTS, luminance, meanLuminance } from "../src/systems/glass_scratches/lights";
+import { controlsOf, stateOf, withState, type Settings } from "../src/systems/glass_scratches/state";
+import fixture from "./glass_scratches_lights.json";
+
+const map = { height: fixture.height, data: Float32Array.from(fixture.radiance) };
+
+describe("lights of an environment", () => {
+  it("are those that the stage draws", () => {
+    const { power, towards } = drawnLights(map);
+    expect(power.length).toBe(3 * LIGHTS);
+    power.forEach((value, n) => expect(value).toBeCloseTo(fixture.power[n], 5));
+    towards.forEach((value, n) => expect(value).toBeCloseTo(fixture.towards[n], 5));
+  });
+
+  it("carry what comes from all around", () => {
+    const environment = new Environment(map);
+    expect(environment.exposure).toBeCloseTo(fixture.exposure, 5);
+    expect(environment.through).toBeCloseTo(fixture.through * fixture.exposure, 5);
+    expect(meanLuminance(map) * environment.exposure).toBeCloseTo(0.35, 9);
+  });
+
+  it("are joined by a lamp of the light that it is asked for", () => {
+    const { edge, colour } = fixture.lamp;
+    const radiance = lampRadiance(3, edge, colour);
+    expect(luminance(radiance) * lampSteradians(edge)).toBeCloseTo(3 * Math.PI * 0.35, 9);
+    radiance.forEach((value, n) => {
+      expect(value / (fixture.lamp.radiance[n] * fixture.exposure)).toBeCloseTo(1, 5);
+    });
+  });
+});
+
+describe("an environment of a person's own", () => {
+  const colours = (width: number, height: number, of: (x: number, y: number) => number) => ({
+    width,
+    height,
+    data: Float32Array.from({ length: 4 * width * height }, (_, n) => of((n >> 2) % width, Math.floor((n >> 2) / width))),
+  });
+
+  it("is kept as it is where it is small", () => {
+    const read = environmentOf(colours(16, 8, (x, y) => x + 100 * y), "small.hdr");
+    expect(read.height).toBe(8);
+    expect(read.data[3 * (16 * 3 + 5)]).toBe(305);
+  });
+
+  it("is averaged where it is large, with the same light", () => {
+    const read = environmentOf(colours(2052, 1026, (x) => (x % 2 ? 4 : 0)), "large.hdr");
+    expect(read.height).toBe(512);
+    const mean = read.data.reduce((sum, value) => sum + value, 0) / read.data.length;
+    expect(mean).toBeCloseTo(2, 4);
+  });
+
+  it("is refused in a sentence where it is none", () => {
+    expect(() => environmentOf(colours(8, 8, () => 1), "a.png")).toThrow("a.png is 8 x 8 pixels; expected an equirectangular");
+    expect(() => environmentOf(colours(16, 8, () => 0), "b.png")).toThrow("b.png is all black");
+    expect(() => environmentOf(colours(16, 8, () => NaN), "c.hdr")).toThrow("c.hdr is all black");
+  });
+});
+
+describe("the state", () => {
+  const settings: Settings = {
+    environment: "lamps",
+    turn: 0,
+    brightness: 1,
+    tilt: 0,
+    swing: 0,
+    coverage: 1,
+    strength: 1,
+    tile: 1,
+    lamp: 2,
+    light: [0, 0, 1],
+    layers: [true, true],
+  };
+
+  it("comes back as it was set", () => {
+    const asked = { ...stateOf(settings), tilt: 12, layer_2: false, light: [0, -2, 0] };
+    const set = withState(settings, asked, ["lamps", "sky"]);
+    expect(stateOf(set)).toEqual({ ...asked, light: [0, -1, 0] });
+    expect(settings.layers).toEqual([true, true]);
+  });
+
+  it("has a control for each of its values", () => {
+    const controls = controlsOf(settings, ["lamps"], async () => {}, ".hdr");
+    const named = controls.filter(({ kind }) => kind !== "drop").map(({ name }) => name);
+    expect(named.sort()).toEqual(Object.keys(stateOf(settings)).sort());
+  });
+
+  it.each([
+    [{ environment: "moon" }, 'environment is "moon"; expected one of lamps, sky.'],
+    [{ turn: "left" }, 'turn is "left"; expected a number.'],
+    [{ tile: 0 }, "tile is 0; expected a positive number."],
+    [{ light: [0, 0, 0] }, "light is [0,0,0]; expected [x, y, z]."],
+    [{ mood: 1 }, "state has mood; expected environment"],
+  ])("refuses %j", (state, sentence) => {
+    expect(() => withState(settings, state, ["lamps", "sky"])).toThrow(sentence);
+  });
+});
