@@ -1,6 +1,6 @@
 """The whole system: importing this declares its assets, in the order of the graph."""
 
-from assets_defs.neural_btf import photographs, abrdfs, network, restoration  # noqa: I001, F401
+from assets_defs.neural_btf import photographs, abrdfs, network, restoration, package  # noqa: I001, F401
 from assets_defs.neural_btf.declaration import BTF
 
 __all__ = ["BTF"]

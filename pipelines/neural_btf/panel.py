@@ -17,14 +17,20 @@ from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, orbit, surface
 from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
+from pipelines.neural_btf.surface_lookup import (
+    dimming,
+    held_directions,
+    in_frames,
+    surface_frames,
+    texels_at,
+    unit,
+)
 
 BACKGROUND = (0.02, 0.022, 0.026)
 LIGHT_THETA = math.radians(50.0)
 _GRID = 160
 _HALF_HEIGHT = 0.75
 _FOLD = 0.05
-_MOST_THETA = math.radians(75.0)
-"""Goniometers measure so far; beyond, the value there is taken, dimmed with the cosine."""
 
 
 class Panel(NamedTuple):
@@ -67,8 +73,8 @@ def folded_panel(tiles: float, aspect: float) -> Panel:
         np.stack([x, y, _FOLD * np.sin(phase)], axis=-1).reshape(-1, 3),
         triangles,
         np.stack([x, y / aspect], axis=-1).reshape(-1, 2) * tiles / 2,
-        _unit(normals).reshape(-1, 3),
-        _unit(along_x).reshape(-1, 3),
+        unit(normals).reshape(-1, 3),
+        unit(along_x).reshape(-1, 3),
     )
 
 
@@ -105,17 +111,17 @@ def draw_frames(
         )
     }
     seen = drawn["uv"][..., 3] > 0
-    texels = _texels(drawn["uv"][seen][:, :2], compressed)
-    frame = _frame(drawn["normal"][seen][:, :3], drawn["tangent"][seen][:, :3])
+    texels = texels_at(drawn["uv"][seen][:, :2], compressed)
+    frame = surface_frames(drawn["normal"][seen][:, :3], drawn["tangent"][seen][:, :3])
     position = drawn["position"][seen][:, :3].astype(np.float64)
-    view = _held(_inside(frame, _unit(np.asarray(camera.position) - position)))
+    view = held_directions(in_frames(frame, unit(np.asarray(camera.position) - position)))
     pictures = np.zeros((len(lights), height, width, 3), np.float32)
     fine = np.zeros((size[1], size[0], 3), np.float32)
     for number, light in enumerate(unit_vectors(lights)):
         progress(number / len(lights))
         towards = np.einsum("nij,j->ni", frame, light)
-        radiance = compressed.radiance(texels, _held(towards), view)
-        fine[seen] = np.maximum(radiance * _dimming(towards[:, 2])[:, None], 0.0)
+        radiance = compressed.radiance(texels, held_directions(towards), view)
+        fine[seen] = np.maximum(radiance * dimming(towards[:, 2])[:, None], 0.0)
         pictures[number] = fine.reshape(height, s, width, s, 3).mean(axis=(1, 3))
     cloth = seen.reshape(height, s, width, s).mean(axis=(1, 3))
     scale = auto_exposure(pictures[:, cloth == 1.0])
@@ -139,44 +145,3 @@ def _draw(
         )
         stage.look(camera)
         return stage.radiance()
-
-
-def _texels(uvs: NDArray[np.float32], compressed: CompressedBtf) -> NDArray[np.int64]:
-    """Texel numbers at texture coordinates (n, 2); a tile's v = 0 is its bottom row's edge."""
-    u, v = np.mod(uvs.astype(np.float64), 1.0).T
-    column = np.minimum((u * compressed.width).astype(np.int64), compressed.width - 1)
-    row = np.minimum(((1.0 - v) * compressed.height).astype(np.int64), compressed.height - 1)
-    return row * compressed.width + column
-
-
-def _frame(normals: NDArray[np.float32], tangents: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Rows are tangent, bitangent, normal (n, 3, 3): turns world vectors into the texture's."""
-    up = _unit(normals.astype(np.float64))
-    along = tangents.astype(np.float64)
-    along = _unit(along - np.sum(along * up, axis=1, keepdims=True) * up)
-    return np.stack([along, np.cross(up, along), up], axis=1)
-
-
-def _inside(frame: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.einsum("nij,nj->ni", frame, vectors)
-
-
-def _held(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors no lower than what was measured; lower ones are lifted, their azimuth kept."""
-    least = math.cos(_MOST_THETA)
-    low = vectors[:, 2] < least
-    lifted = vectors.copy()
-    lifted[low & (vectors[:, 2] == -1.0), 0] = 1.0  # straight from below: any azimuth will do
-    level = np.hypot(lifted[low, 0], lifted[low, 1])
-    lifted[low, :2] *= (math.sin(_MOST_THETA) / np.maximum(level, 1e-12))[:, None]
-    lifted[low, 2] = least
-    return lifted
-
-
-def _dimming(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 down to 75°, then with the cosine of the light's angle to 0 at the horizon."""
-    return np.clip(cosine / math.cos(_MOST_THETA), 0.0, 1.0)
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -185,6 +185,14 @@ CLOTH_FRAMES = Schema(
     },
 )
 
+BTF_PACKAGE = Schema(
+    _SYSTEM,
+    "btf_package",
+    1,
+    "The compressed BTF as a runtime package (docs/packages.md).",
+    {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
+)
+
 SCHEMAS = (
     BTF_IMAGES,
     ABRDF_MATRIX,
@@ -193,4 +201,5 @@ SCHEMAS = (
     COMPRESSED_BTF,
     RESTORED_IMAGES,
     CLOTH_FRAMES,
+    BTF_PACKAGE,
 )

@@ -15,6 +15,7 @@ import pytest
 from assets_defs.launcher import LaunchError, Request
 from assets_defs.neural_btf import datasets
 from assets_defs.neural_btf import network as network_assets
+from assets_defs.neural_btf import package as package_assets
 from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.graph import BTF
 from pipelines.light import directions
@@ -234,6 +235,11 @@ def _tiny_panel(right: Callable[..., Any], *arguments: Any) -> Any:
     return made._replace(vertices=made.vertices * 0.3)
 
 
+def _next_latents(right: Callable[..., Any], scenery: Any) -> Any:
+    values = right(scenery)
+    return values | {"latents": np.roll(values["latents"], 1, axis=0)}
+
+
 REGRESSIONS = (
     Regression("missing_pairs", directions, "all_pairs", _double_pair, MATERIAL),
     Regression(
@@ -280,6 +286,7 @@ REGRESSIONS = (
     Regression(
         "mean_brightness", panel, "to_8bit", lambda right, picture: right(picture * 0.7), WITHOUT
     ),
+    Regression("mismatches", package_assets, "_values", _next_latents, CLUSTERED),
 )
 
 

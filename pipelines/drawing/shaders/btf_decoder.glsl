@@ -1,0 +1,47 @@
+// The neural BTF's decoder (paper 1, figure 5): 8 latents and two directions to RGB over alpha by
+// three hidden layers of 106 neurons, padded to 27 vectors. A row of the texture is four neurons:
+// a texel an input and the bias in the last column, rows of a layer below those of the layer before.
+
+#include "stereographic.glsl"
+
+uniform sampler2D weights;
+
+// Four neurons' share of four inputs, the first of which is in this column.
+vec4 fourInputs(int column, int row, vec4 values) {
+  return mat4(texelFetch(weights, ivec2(column, row), 0),
+              texelFetch(weights, ivec2(column + 1, row), 0),
+              texelFetch(weights, ivec2(column + 2, row), 0),
+              texelFetch(weights, ivec2(column + 3, row), 0)) * values;
+}
+
+// Four neurons of all that a hidden layer says.
+vec4 fourNeurons(int row, vec4 values[27]) {
+  vec4 sum = texelFetch(weights, ivec2(108, row), 0);
+#pragma unroll_loop_start
+  for (int i = 0; i < 27; i++) {
+    sum += fourInputs(4 * i, row, values[i]);
+  }
+#pragma unroll_loop_end
+  return sum;
+}
+
+// latents: the first and the last four. Directions are unit vectors in the texture's frame, z >= 0.
+vec3 decodedColour(vec4 latents[2], vec3 light, vec3 view) {
+  vec4 directions = vec4(stereographicPlace(light), stereographicPlace(view));
+  vec4 before[27], after[27];
+  for (int row = 0; row < 27; row++) {
+    before[row] = max(texelFetch(weights, ivec2(108, row), 0) + fourInputs(0, row, latents[0]) +
+                      fourInputs(4, row, latents[1]) + fourInputs(8, row, directions), 0.0);
+  }
+  // One loop for all layers: the unrolled sum is long to compile.
+  vec4 sum;
+  for (int layer = 1; layer < 4; layer++) {
+    int rows = layer < 3 ? 27 : 1;
+    for (int row = 0; row < rows; row++) {
+      sum = fourNeurons(27 * layer + row, before);
+      after[row] = max(sum, 0.0);
+    }
+    before = after;
+  }
+  return sum.rgb;
+}

@@ -1,0 +1,132 @@
+"""Cloth on the stage by a shader that holds the decoder: what live pictures elsewhere show, too.
+
+`panel` asks torch for each pixel instead, which is faster without a graphics card.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.stage import PAINTED, Camera, Stage, surface, texture
+from pipelines.neural_btf.compressed import CompressedBtf
+from pipelines.neural_btf.decoder_arrays import HIDDEN, LAYERS, DecoderArrays
+from pipelines.neural_btf.hanging_cloth import HangingCloth, Surroundings
+
+_FOUR = 4
+_VECTORS = -(-HIDDEN // _FOUR)
+"""Of four neurons, of a hidden layer."""
+_LONGEST_ROW = 2048
+_FAR_AWAY = 1e4
+"""An orthographic camera is so many times as far away as its position."""
+
+
+class Scenery(NamedTuple):
+    """What is drawn: a cloth of a material, and what is around it."""
+
+    btf: CompressedBtf
+    cloth: HangingCloth
+    around: Surroundings | None
+
+
+class Showing(NamedTuple):
+    """How it is drawn."""
+
+    light: Sequence[float]
+    """Unit vector towards the light."""
+    tiles: float
+    """Tiles of the material over the cloth's width."""
+    exposure: float
+    """Factor on the cloth's radiance."""
+
+
+def weight_texels(decoder: DecoderArrays) -> NDArray[np.float32]:
+    """Weights and biases as `btf_decoder.glsl` has them, (82, 109, 4).
+
+    A row is four neurons, a column an input, the last column the bias. What pads layers is 0.
+    """
+    texels = np.zeros((_VECTORS * (LAYERS - 1) + 1, _VECTORS * _FOUR + 1, _FOUR), np.float32)
+    for layer in range(1, LAYERS + 1):
+        weight, bias = decoder[f"weight_{layer}"], decoder[f"bias_{layer}"]
+        outputs, inputs = weight.shape
+        rows = -(-outputs // _FOUR)
+        padded = np.zeros((rows * _FOUR, texels.shape[1]), np.float32)
+        padded[:outputs, :inputs] = weight
+        padded[:outputs, -1] = bias
+        first = _VECTORS * (layer - 1)
+        texels[first : first + rows] = padded.reshape(rows, _FOUR, -1).transpose(0, 2, 1)
+    return texels
+
+
+def latent_texels(latents: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Latents (k, 8) as lines of texels (y, x, 4), two texels a vector."""
+    columns = min(2 * len(latents), _LONGEST_ROW)
+    rows = -(-2 * len(latents) // columns)
+    texels = np.zeros((rows * columns, _FOUR), np.float32)
+    texels[: 2 * len(latents)] = latents.reshape(-1, _FOUR)
+    return texels.reshape(rows, columns, _FOUR)
+
+
+def cloth_actor(btf: CompressedBtf, cloth: HangingCloth, showing: Showing, camera: Camera) -> Any:
+    """The cloth as this camera sees it, in one draw call."""
+    position = np.asarray(camera.position)
+    if camera.height is not None:
+        target = np.asarray(camera.target)
+        position = target + _FAR_AWAY * (position - target)
+    lines = {"weights": weight_texels(btf.decoder), "latentVectors": latent_texels(btf.latents)}
+    if btf.ids is not None:
+        numbers = btf.ids.reshape(btf.height, btf.width, 1)
+        lines["owners"] = numbers.astype(np.float32)
+    return surface(
+        cloth.vertices,
+        cloth.triangles,
+        attributes={"upright": cloth.normals, "tangent": cloth.tangents, "place": cloth.places},
+        # A texture's rows count from the bottom: the picture's last row is row 0 there.
+        textures={
+            name: texture(np.ascontiguousarray(rows[::-1]), interpolate=False)
+            for name, rows in lines.items()
+        },
+        shader=surface_shader(
+            "btf_cloth_vertex.glsl",
+            "btf_cloth_fragment.glsl",
+            SHARED=btf.ids is not None,
+            TEXELS=[btf.width, btf.height],
+            TILES=float(showing.tiles),
+            LIGHT=list(showing.light),
+            EYE=position.tolist(),
+            SCALE=float(showing.exposure * btf.alpha),
+        ),
+        lit=False,
+    )
+
+
+def draw_cloth(
+    scenery: Scenery,
+    showing: Showing,
+    camera: Camera,
+    *,
+    width: int,
+    height: int,
+    supersampling: int = 1,
+) -> NDArray[np.float32]:
+    """Linear radiance and coverage (height, width, 4)."""
+    around = scenery.around
+    with Stage(width, height, supersampling=supersampling) as stage:
+        stage.add(cloth_actor(scenery.btf, scenery.cloth, showing, camera))
+        if around is not None:
+            attributes = {"shown": around.radiance}
+            stage.add(
+                surface(
+                    around.vertices,
+                    around.triangles,
+                    attributes=attributes,
+                    shader=PAINTED,
+                    lit=False,
+                )
+            )
+        stage.look(camera)
+        return stage.radiance()

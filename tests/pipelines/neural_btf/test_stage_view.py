@@ -1,0 +1,201 @@
+"""The decoder on the stage against torch and NumPy, and the cloth that it is drawn on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipelines.drawing.glsl import Shader, shader_source
+from pipelines.drawing.stage import Stage, orbit, surface, texture
+from pipelines.neural_btf.compressed import CompressedBtf
+from pipelines.neural_btf.decoder_arrays import decode_in_numpy, direction_inputs_of_vectors
+from pipelines.neural_btf.hanging_cloth import hanging_cloth, surroundings
+from pipelines.neural_btf.live_parts import (
+    HOME,
+    decoded_cloth,
+    home_exposure,
+    input_picture,
+    reference_views,
+    scenery_of,
+    unit_light,
+)
+from pipelines.neural_btf.network import Decoder, decoder_arrays
+from pipelines.neural_btf.stage_view import Showing, draw_cloth, latent_texels, weight_texels
+
+SIZE = (48, 36)
+LIGHT = unit_light((-0.6, -0.7, 0.5))
+MOST = 2e-6
+"""Float32 in another order of sums; colours are up to 1."""
+
+
+def btf(shared: bool, *, seed: int = 0) -> CompressedBtf:
+    """A decoder of random weights, brightened so that most of what it says is positive."""
+    import torch
+
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    arrays = {name: values.copy() for name, values in decoder_arrays(Decoder()).items()}
+    arrays["weight_4"] = arrays["weight_4"] * np.float32(6.0)
+    arrays["bias_4"] = arrays["bias_4"] + np.float32(0.4)
+    latents = rng.normal(size=(7 if shared else 30, 8)).astype(np.float32)
+    ids = rng.integers(7, size=30).astype(np.int32) if shared else None
+    return CompressedBtf(arrays, latents, ids, 1.7, height=5, width=6)
+
+
+def decoded_by_the_stage(
+    made: CompressedBtf, latents: Any, light: Any, view: Any
+) -> NDArray[np.float32]:
+    """What `btf_decoder.glsl` says of latents (n, 8) and unit vectors (n, 3), (n, 3)."""
+    rows = np.zeros((4, len(latents), 4), np.float32)
+    rows[0], rows[1], rows[2, :, :3], rows[3, :, :3] = latents[:, :4], latents[:, 4:], light, view
+    at = "texelFetch(inputs, ivec2(int(gl_FragCoord.x), {}), 0)"
+    first, last, lit, seen = (at.format(row) for row in range(4))
+    code = (
+        f"  vec4 latents[2];\n  latents[0] = {first};\n  latents[1] = {last};\n"
+        f"  diffuseColor = decodedColour(latents, {lit}.xyz, {seen}.xyz);\n"
+    )
+    shader = Shader(
+        fragment={
+            "CustomUniforms::Dec": "",
+            "TMap::Dec": f"uniform sampler2D inputs;\n{shader_source('btf_decoder.glsl')}",
+            "Color::Impl": f"//VTK::Color::Impl\n{code}",
+        }
+    )
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [len(latents), 1.0, 1.0]
+    textures = {"inputs": rows, "weights": weight_texels(made.decoder)}
+    square = surface(
+        corners,
+        [[0, 1, 2], [0, 2, 3]],
+        textures={
+            name: texture(np.ascontiguousarray(values[::-1]), interpolate=False)
+            for name, values in textures.items()
+        },
+        shader=shader,
+        lit=False,
+    )
+    with Stage(len(latents), 1) as stage:
+        stage.add(square)
+        stage.look(orbit((0, 0, 0), 5, azimuth=-90, elevation=90, height=1))
+        return stage.radiance()[0, :, :3]
+
+
+def upper_directions(count: int, seed: int) -> NDArray[np.float64]:
+    found = np.random.default_rng(seed).normal(size=(count, 3))
+    found[:, 2] = np.abs(found[:, 2])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def test_the_shader_decodes_as_torch_and_numpy_do() -> None:
+    made, count = btf(shared=False), 30
+    light, view = upper_directions(count, 1), upper_directions(count, 2)
+    found = decoded_by_the_stage(made, made.latents, light, view)
+    inputs = direction_inputs_of_vectors(light, view)
+    in_numpy = [
+        decode_in_numpy(made.decoder, made.latents[n : n + 1], inputs[n : n + 1])[0, 0]
+        for n in range(count)
+    ]
+    assert np.ptp(in_numpy) > 0.5
+    np.testing.assert_allclose(found, in_numpy, atol=MOST)
+    by_torch = made.radiance(np.arange(count), light, view) / made.alpha
+    np.testing.assert_allclose(found, by_torch, atol=MOST)
+    swapped = made.radiance(np.arange(count), view, light) / made.alpha
+    assert np.abs(found - swapped).max() > 0.01
+
+
+def test_weights_and_latents_are_all_in_the_texels() -> None:
+    made = btf(shared=False)
+    texels = weight_texels(made.decoder)
+    assert texels.shape == (82, 109, 4)
+    assert np.count_nonzero(texels) == 24_383
+    assert texels[27 + 5, 17, 2] == made.decoder["weight_2"][22, 17]
+    assert texels[81, 108, 1] == made.decoder["bias_4"][1]
+    many = np.arange(8 * 1500, dtype=np.float32).reshape(1500, 8)
+    lines = latent_texels(many)
+    assert lines.shape == (2, 2048, 4)
+    assert np.array_equal(lines.reshape(-1, 8)[:1500], many)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_the_cloth_is_as_torch_decodes_it(shared: bool) -> None:
+    scenery = scenery_of(btf(shared))
+    showing = Showing(LIGHT, 2.0, 0.8)
+    drawn = draw_cloth(scenery, showing, HOME, width=SIZE[0], height=SIZE[1])
+    expected = decoded_cloth(scenery, showing, HOME, SIZE)
+    apart = np.abs(drawn - expected).max(axis=-1)
+    # At the edges of texels the last bit of a place decides: at most one pixel in a hundred.
+    assert np.quantile(apart, 0.99) < MOST
+    other = decoded_cloth(scenery, showing._replace(light=unit_light((0.9, -0.4, 0))), HOME, SIZE)
+    assert np.quantile(np.abs(drawn - other).max(axis=-1), 0.9) > 0.01
+
+
+def test_the_back_of_the_cloth_is_lit_from_behind() -> None:
+    scenery = scenery_of(btf(shared=False))
+    behind = orbit((0.0, 0.0, 0.0), 4.0, 90.0, 5.0)
+    means = [
+        decoded_cloth(scenery._replace(around=None), Showing(light, 2.0, 1.0), behind, SIZE)
+        for light in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+    ]
+    drawn = draw_cloth(
+        scenery._replace(around=None),
+        Showing((0.0, 1.0, 0.0), 2.0, 1.0),
+        behind,
+        width=SIZE[0],
+        height=SIZE[1],
+    )
+    assert np.quantile(np.abs(drawn - means[0]).max(axis=-1), 0.98) < MOST
+    assert means[0][..., :3].mean() > 10 * means[1][..., :3].mean()
+
+
+def test_the_cloth_hangs_and_its_vectors_are_the_surfaces() -> None:
+    cloth = hanging_cloth(0.5)
+    corners = cloth.vertices[cloth.triangles].astype(np.float64)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    assert (facing[:, 1] < 0).all()
+    means = cloth.normals[cloth.triangles].mean(axis=1)
+    assert np.sum(facing * means, axis=1).min() > 0.99
+    np.testing.assert_allclose(np.linalg.norm(cloth.tangents, axis=1), 1, atol=1e-6)
+    assert (cloth.tangents[:, 0] > 0.4).all()
+    # The material keeps its shape: as far along u as along v, within what folds stretch.
+    size = np.ptp(cloth.places, axis=0)
+    assert size[0] == pytest.approx(1.0)
+    assert size[1] == pytest.approx(0.9 / 0.5, rel=1e-5)
+
+
+def test_the_room_is_around_the_cloth() -> None:
+    room, cloth = surroundings(), hanging_cloth(1.0)
+    assert np.linalg.norm(room.vertices, axis=1).max() > 3 * np.linalg.norm(HOME.position)
+    assert (room.radiance > 0).all()
+    assert room.radiance.max() < 1
+    assert len(room.vertices) == len(room.radiance)
+    assert room.triangles.max() < len(room.vertices)
+    assert np.abs(cloth.vertices).max() < 1.2
+
+
+def test_reference_views_show_the_light_that_they_name() -> None:
+    scenery = scenery_of(btf(shared=True))
+    exposure = home_exposure(scenery, 2.0)
+    views = reference_views(scenery, 2.0, exposure, 32)
+    assert [view.frame.shape for view in views] == [(24, 32, 3)] * 3
+    for view in views:
+        showing = Showing(view.light, view.tiles, exposure)
+        decoded = decoded_cloth(scenery, showing, view.camera, (64, 48))[..., :3]
+        decoded = decoded.reshape(24, 2, 32, 2, 3).mean(axis=(1, 3))
+        codes = 255 * np.where(
+            decoded <= 0.0031308,
+            12.92 * decoded,
+            1.055 * np.maximum(decoded, 1e-9) ** (1 / 2.4) - 0.055,
+        )
+        apart = np.abs(np.clip(codes, 0, 255) - view.frame).max(axis=-1)
+        assert np.quantile(apart, 0.96) <= 0.51
+    assert np.abs(views[0].frame.astype(float) - views[1].frame).mean() > 2
+
+
+def test_a_photograph_is_shown_large() -> None:
+    photograph = np.random.default_rng(0).random((12, 20, 3)).astype(np.float32)
+    shown = input_picture(photograph)
+    assert shown.shape == (22 * 12, 22 * 20, 3)
+    assert (shown[:22, :22] == shown[0, 0]).all()

@@ -1,0 +1,53 @@
+/** The decoder and the latents as textures, as `pipelines/neural_btf/stage_view.py` has them. */
+
+import type { Picture } from "../../package/package";
+
+/** Layers of the decoder: inputs, three times neurons, channels. */
+export const LAYERS = [12, 106, 106, 106, 3] as const;
+const FOUR = 4;
+const VECTORS = Math.ceil(106 / FOUR);
+const COLUMNS = VECTORS * FOUR + 1;
+const LONGEST_ROW = 2048;
+
+/** A layer's weights (outputs, inputs) and biases. */
+export interface Layer {
+  weight: Float32Array;
+  bias: Float32Array;
+}
+
+/**
+ * All layers: a row is four neurons, a column an input, the last column the bias. What pads layers
+ * is 0. Row 0 is the first.
+ */
+export function weightTexels(layers: readonly Layer[]): Picture<Float32Array> {
+  const height = VECTORS * (layers.length - 1) + 1;
+  const data = new Float32Array(height * COLUMNS * FOUR);
+  layers.forEach(({ weight, bias }, layer) => {
+    const inputs = LAYERS[layer];
+    for (let neuron = 0; neuron < LAYERS[layer + 1]; neuron++) {
+      const row = VECTORS * layer + Math.floor(neuron / FOUR);
+      const at = (column: number) => (row * COLUMNS + column) * FOUR + (neuron % FOUR);
+      for (let input = 0; input < inputs; input++) data[at(input)] = weight[neuron * inputs + input];
+      data[at(COLUMNS - 1)] = bias[neuron];
+    }
+  });
+  return { width: COLUMNS, height, channels: FOUR, data };
+}
+
+/** Latents (k, 8) as lines of texels, two texels a vector. */
+export function latentTexels(latents: Float32Array): Picture<Float32Array> {
+  const texels = latents.length / FOUR;
+  const width = Math.min(texels, LONGEST_ROW);
+  const height = Math.ceil(texels / width);
+  const data = new Float32Array(width * height * FOUR);
+  data.set(latents);
+  return { width, height, channels: FOUR, data };
+}
+
+/** A picture with its last row first: `texture` puts the last row at the bottom, which is row 0. */
+export function upsideDown({ width, height, channels, data }: Picture<Float32Array>): Picture<Float32Array> {
+  const row = width * channels;
+  const turned = new Float32Array(data.length);
+  for (let y = 0; y < height; y++) turned.set(data.subarray(y * row, (y + 1) * row), (height - 1 - y) * row);
+  return { width, height, channels, data: turned };
+}
