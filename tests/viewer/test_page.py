@@ -202,3 +202,12 @@ def test_a_phone_has_the_picture_and_a_sheet_of_settings(small: Path, open_small
     assert page.locator(".drawer").bounding_box()["width"] == 390
     page.tap("[title^=Figures]")
     assert not page.locator(".drawer").is_visible()
+
+
+@pytest.mark.slow
+def test_a_lost_graphics_card_is_told(small: Path, open_small: Open) -> None:
+    viewer = open_small(small, allowed="Context Lost").ready()
+    lose = "document.querySelector('canvas.live').getContext('webgl2')"
+    viewer.evaluate(f"() => {lose}.getExtension('WEBGL_lose_context').loseContext()")
+    viewer.page.wait_for_selector("[role=alert]")
+    assert "has dropped this page; load it again." in viewer.page.inner_text("[role=alert]")

@@ -6,6 +6,7 @@ import base64
 import functools
 import io
 import json
+import socket
 import threading
 import zipfile
 from collections.abc import Callable
@@ -16,9 +17,15 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import xarray as xr
 
+from assets_defs.picture_links import note_picture_port
+from assets_defs.picture_server import PictureServer
+from assets_defs.viewer_files import live_view_address
+from assets_defs.workspace import Workspace
 from storage.packages import read_package
 from storage.packages.conformance import good_packages
+from storage.versions import Slot
 from tsuya.exports.pages import write_site
 
 Open = Callable[..., Any]
@@ -132,6 +139,25 @@ def test_a_site_is_shown_by_a_host_without_ranges(
         viewer.wait_for("() => Boolean(window.tsuya.live)")
         viewer.ready()
         assert viewer.capture(2, 2).shape == (2, 2, 3)
+        server.shutdown()
+
+
+@pytest.mark.slow
+def test_the_web_uis_server_of_pictures_shows_a_package(
+    content: bytes, tmp_path: Path, open_small: Open
+) -> None:
+    workspace = Workspace(tmp_path / "data")
+    slot = Slot("photo_fur", "fur_package", "teapot.grass")
+    dataset = xr.Dataset({"file": ("byte", np.frombuffer(content, np.uint8))})
+    workspace.store.write(slot, dataset, {"settings": {}, "recipe": "of a test", "checks": []})
+    listener = socket.socket()
+    listener.bind(("127.0.0.1", 0))
+    note_picture_port(workspace, listener.getsockname()[1])
+    with PictureServer(workspace.root / "full_size", listener) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        viewer = open_small(address=live_view_address(workspace, slot)).ready()
+        assert viewer.capture(2, 2).shape == (2, 2, 3)
+        assert viewer.page.inner_text("h1") == "Every kind of part"
         server.shutdown()
 
 

@@ -53,7 +53,7 @@ async function showGallery(): Promise<void> {
 async function showPackage(key: string, address: Address, isLast: () => boolean): Promise<void> {
   const waiting = element("div", { class: "waiting", role: "status" }, "opening …");
   document.body.replaceChildren(waiting);
-  stage ??= makeStage();
+  stage ??= watched(makeStage());
   const pkg = await find(key);
   document.title = `${pkg.meta.title} · Tsuya`;
   const poster = await partCanvas(pkg, "poster", pkg.meta.title);
@@ -73,6 +73,15 @@ async function showPackage(key: string, address: Address, isLast: () => boolean)
   testHook.firstPicture ??= performance.now();
   waiting.remove();
   stage.canvas.focus({ preventScroll: true });
+}
+
+/** A graphics driver that starts again, or a page that took too much, ends all drawing. */
+function watched(made: Stage): Stage {
+  made.canvas.addEventListener("webglcontextlost", () => {
+    leave();
+    document.body.replaceChildren(sentencePage("The graphics card has dropped this page; load it again."));
+  });
+  return made;
 }
 
 function find(key: string): Promise<Package> {
