@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from storage.packages import Package
-from storage.packages.glb import Z_UP_TO_Y_UP, container
+from storage.packages.glb import Z_UP_TO_Y_UP
+from tsuya.exports.glb_file import GlbFile
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +20,6 @@ _METALLIC = 0.2
 """F0 above which a material without textures is taken for a metal."""
 _USUAL = 0.04
 """F0 that glTF's materials have without extensions."""
-_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
 class Map(NamedTuple):
@@ -89,7 +89,7 @@ def scene_glb(package: Package, sky: NDArray[np.float32]) -> bytes:
     """The scene as a .glb with a primitive a material; ``sky`` (V,) of the mesh's vertices."""
     import numpy as np
 
-    mesh, glb = package.mesh("mesh"), _Glb()
+    mesh, glb = package.mesh("mesh"), GlbFile()
     assert mesh.normals is not None
     assert mesh.uvs is not None
     attributes = {
@@ -124,7 +124,7 @@ def scene_glb(package: Package, sky: NDArray[np.float32]) -> bytes:
     return glb.whole(document)
 
 
-def _materials(package: Package, glb: _Glb, images: list[int]) -> dict[str, Any]:
+def _materials(package: Package, glb: GlbFile, images: list[int]) -> dict[str, Any]:
     """glTF's materials, textures, samplers and images."""
     materials, textures, samplers = [], [], []
     for made in materials_of(package):
@@ -161,58 +161,3 @@ def _material(made: Material, placed: dict[str, Any]) -> dict[str, Any]:
     if "normal" in placed:
         material["normalTexture"] = placed["normal"] | {"scale": made.bend}
     return material
-
-
-class _Glb:
-    """The buffer of a .glb, its views and accessors."""
-
-    def __init__(self) -> None:
-        self._content = bytearray()
-        self._views: list[dict[str, int]] = []
-        self._accessors: list[dict[str, Any]] = []
-
-    def values(self, array: NDArray[Any]) -> int:
-        """The number of an accessor of floats (N,) or (N, k)."""
-        import numpy as np
-
-        stored = np.ascontiguousarray(array, "<f4")
-        rows = stored.reshape(len(stored), -1)
-        return self._accessor(
-            {
-                "bufferView": self._view(stored.tobytes()),
-                "componentType": 5126,
-                "count": len(rows),
-                "type": _TYPES[rows.shape[1]],
-                "min": rows.min(axis=0).tolist(),
-                "max": rows.max(axis=0).tolist(),
-            }
-        )
-
-    def indices(self, corners: NDArray[np.integer]) -> int:
-        """The number of an accessor of vertex numbers."""
-        stored = corners.reshape(-1).astype("<u4")
-        made = {"bufferView": self._view(stored.tobytes()), "componentType": 5125}
-        return self._accessor(made | {"count": len(stored), "type": "SCALAR"})
-
-    def picture(self, codes: NDArray[np.uint8]) -> int:
-        """The number of a view that holds a picture as PNG."""
-        import imagecodecs
-
-        return self._view(bytes(imagecodecs.png_encode(codes)))
-
-    def whole(self, document: dict[str, Any]) -> bytes:
-        """The file."""
-        buffers = {"buffers": [{"byteLength": len(self._content)}]}
-        parts = {"bufferViews": self._views, "accessors": self._accessors}
-        return container(document | buffers | parts, bytes(self._content))
-
-    def _view(self, content: bytes) -> int:
-        self._views.append(
-            {"buffer": 0, "byteOffset": len(self._content), "byteLength": len(content)}
-        )
-        self._content += content + b"\0" * (-len(content) % 4)
-        return len(self._views) - 1
-
-    def _accessor(self, made: dict[str, Any]) -> int:
-        self._accessors.append(made)
-        return len(self._accessors) - 1
