@@ -330,11 +330,10 @@ async function fullScreen(): Promise<void> {
   else await document.documentElement.requestFullscreen?.();
 }
 
-/** For fingers: what the arrow keys do while they are held. */
+/** For thumbs, and to show them: the keys that drive, while they are held. */
 function driveButtons(canvas: HTMLCanvasElement): HTMLElement {
-  const signs = { ArrowUp: "▲", ArrowLeft: "◀", ArrowDown: "▼", ArrowRight: "▶" };
-  const buttons = Object.entries(signs).map(([key, sign]) => {
-    const made = element("button", { type: "button", class: key, "aria-label": key.replace("Arrow", "Drive ") }, sign);
+  const pad = (key: string, shown: string, label: string) => {
+    const made = element("button", { type: "button", class: key, "aria-label": label, title: `${label} (${key.replace("Arrow", "").toUpperCase()})` }, shown);
     const send = (kind: string) => canvas.dispatchEvent(new KeyboardEvent(kind, { key }));
     made.onpointerdown = (event) => {
       made.setPointerCapture(event.pointerId);
@@ -343,6 +342,18 @@ function driveButtons(canvas: HTMLCanvasElement): HTMLElement {
     made.onpointerup = made.onpointercancel = () => send("keyup");
     made.oncontextmenu = (event) => event.preventDefault();
     return made;
-  });
-  return element("div", { class: "drive" }, ...buttons);
+  };
+  return element(
+    "div",
+    { class: "drive" },
+    element(
+      "div",
+      {},
+      pad("ArrowLeft", "↰", "Turn left"),
+      pad("ArrowRight", "↱", "Turn right"),
+      pad("a", "◀", "Step left"),
+      pad("d", "▶", "Step right"),
+    ),
+    element("div", {}, pad("ArrowUp", "▲", "Drive"), pad("ArrowDown", "▼", "Drive back")),
+  );
 }
