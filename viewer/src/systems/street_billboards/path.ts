@@ -57,8 +57,16 @@ export class Path {
       const distance = from.clone().addScaledVector(step, kept).distanceTo(point);
       if (distance < best) [best, along] = [distance, this.along[frame - 1] + kept * step.length()];
     }
-    const offset = point.sub(this.at(along));
-    const azimuth = this.azimuth(along);
+    const offset = new Vector3();
+    let azimuth = 0;
+    // To where the smooth way is straight below: who drives on beside a bend stays beside it.
+    for (let step = 0; step < 6; step++) {
+      azimuth = this.azimuth(along);
+      offset.copy(point).sub(this.at(along));
+      const ahead = Math.cos(azimuth) * offset.x + Math.sin(azimuth) * offset.y;
+      if (along + ahead < 0 || along + ahead > this.length || Math.abs(ahead) < 1e-6) break;
+      along += ahead;
+    }
     return { along, left: -Math.sin(azimuth) * offset.x + Math.cos(azimuth) * offset.y, above: offset.z };
   }
 
