@@ -17,7 +17,7 @@ from assets_defs.sources import Source
 from assets_defs.street_billboards.datasets import compressed_of, pages_of, views_of
 from assets_defs.street_billboards.graph import STREET
 from pipelines.geometry.cameras import moved_left
-from pipelines.street_billboards import billboards, figures, octree
+from pipelines.street_billboards import billboards, figures, live_tiles, octree
 from pipelines.street_billboards.capture import exposure, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, processor_street, quads, street_stage
 from pipelines.street_billboards.frames import draw_view
@@ -26,6 +26,7 @@ from pipelines.street_billboards.textures import atlases, eigen_textures, view_t
 from pipelines.street_billboards.textures.texture_tables import SEEN
 from pipelines.virtual.city import drive as city_drive
 from pipelines.virtual.city import drive_photographs
+from storage.packages import encoding
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 KEYS = {"drive": "city"}
@@ -337,6 +338,13 @@ def _paler(right: Callable[..., Any], *arguments: Any) -> Any:
     arguments[-1][..., :3] //= 2
 
 
+def _beside(right: Any, *arguments: Any) -> Any:
+    """Billboards a hand's breadth from where they stand."""
+    headers = right(*arguments)
+    headers[:, ::5, 1] += 0.1
+    return headers
+
+
 REGRESSIONS = (
     Regression("exposure_spread", drive_photographs, "expose_photograph", _bright_camera, KEYS),
     Regression("detail", drive_photographs, "expose_photograph", _blurred, KEYS),
@@ -376,6 +384,8 @@ REGRESSIONS = (
     Regression("held_out_ssim", figures, "match_exposure", _shaken, KEYS),
     Regression("held_out_flip", figures, "match_exposure", _shaken, KEYS),
     Regression("shader_difference", processor_street, "decode_views", _paler, KEYS),
+    Regression("mismatches", encoding, "_png", lambda right, codes: right(codes[:, ::-1]), KEYS),
+    Regression("tile_error", live_tiles, "page_headers", _beside, KEYS),
 )
 
 

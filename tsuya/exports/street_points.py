@@ -71,7 +71,7 @@ def write_glb(package: Package, target: Path) -> Notes:
     for name, points in _tiles(package):
         attributes: dict[str, NDArray[Any]] = {
             "POSITION": points.places,
-            "COLOR_0": _linear_codes(points.colours),
+            "COLOR_0": _linear(points.colours),
         }
         _write(target / f"{name}.glb", _point_glb(attributes))
     return (_FROM_ONE_SIDE,)
@@ -86,7 +86,7 @@ def write_splats(package: Package, target: Path) -> Notes:
         harmonic = (points.colours.astype(np.float32) / 255.0 - 0.5) / _HARMONIC_0
         attributes: dict[str, NDArray[Any]] = {
             "POSITION": points.places,
-            "COLOR_0": _linear_codes(points.colours),
+            "COLOR_0": _linear(points.colours),
             f"{_EXTENSION}:ROTATION": points.rotations,
             f"{_EXTENSION}:SCALE": np.hstack([_SIGMA * points.spacings, thin]),
             f"{_EXTENSION}:OPACITY": np.ones(len(points.places), np.float32),
@@ -123,21 +123,21 @@ def _tiles(package: Package) -> Iterator[tuple[str, _Points]]:
             yield f"tile_{number:03d}", _Points(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _linear_codes(colours: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """(n, 4), linear light and opacity, of 16 bits: as glTF has vertices' colours."""
+def _linear(colours: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(n, 4), linear light and opacity, as glTF has vertices' colours."""
     import numpy as np
 
     from pipelines.drawing.colour import decode_srgb
 
-    linear = np.ones((len(colours), 4))
+    linear = np.ones((len(colours), 4), np.float32)
     linear[:, :3] = decode_srgb(colours / 255.0)
-    return np.rint(65535.0 * linear).astype(np.uint16)
+    return linear
 
 
 def _point_glb(
     attributes: Mapping[str, NDArray[Any]], extensions: Mapping[str, Any] | None = None
 ) -> bytes:
-    """Points of these attributes, float32 or 16-bit codes, z up under a node that turns z to y."""
+    """Points of these attributes, all float32, z up under a node that turns z to y."""
     import numpy as np
 
     from storage.packages.glb import Z_UP_TO_Y_UP, container
@@ -145,16 +145,13 @@ def _point_glb(
     kinds = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
     content, views, accessors = b"", list[dict[str, Any]](), list[dict[str, Any]]()
     for name, values in attributes.items():
-        stored = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
-        is_codes = stored.dtype.kind == "u"
+        stored = np.ascontiguousarray(values, "<f4")
         accessor: dict[str, Any] = {
             "bufferView": len(views),
-            "componentType": 5123 if is_codes else 5126,
+            "componentType": 5126,
             "count": len(stored),
             "type": kinds[stored.shape[1] if stored.ndim == 2 else 1],
         }
-        if is_codes:
-            accessor["normalized"] = True
         if name == "POSITION":
             accessor |= {"min": stored.min(axis=0).tolist(), "max": stored.max(axis=0).tolist()}
         views.append({"buffer": 0, "byteOffset": len(content), "byteLength": stored.nbytes})
