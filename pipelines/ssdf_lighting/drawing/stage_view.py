@@ -151,7 +151,7 @@ class _Part:
     ) -> None:
         self._chosen, corners = np.unique(triangles[finish.triangles], return_inverse=True)
         self._count = count = len(cosine.irradiance)
-        self._matt = fixed(_matt_rows(cosine))
+        self._matt = fixed(matt_rows(cosine))
         names = [f"edge{number}" for number in range(-(-count // 4) * (1 + finish.has_gloss))]
         self.actor = surface(
             points[self._chosen],
@@ -180,7 +180,7 @@ class _Part:
             self._uniforms.SetUniform4f(name, values)
 
     def show_tables(self, tables: LobeTables) -> None:
-        _memory_of(self._matt)[:] = _matt_rows(tables.cosine)
+        _memory_of(self._matt)[:] = matt_rows(tables.cosine)
         self._matt.GetInput().GetPointData().GetScalars().Modified()
         self._matt.GetInput().Modified()
 
@@ -224,7 +224,7 @@ def draw_lit(
 # ---- tables and memory of the graphics library -------------------------------------------------
 
 
-def _matt_rows(lobes: CosineLobes) -> NDArray[np.float32]:
+def matt_rows(lobes: CosineLobes) -> NDArray[np.float32]:
     """(N, _FINE + 1, 3): irradiance / pi, sqrt(1 + λ), 1 / share at the horizon."""
     cosine = np.linspace(-1.0, 1.0, lobes.irradiance.shape[1])
     horizon = np.arcsin(np.clip(lobes.along * cosine + lobes.up, -1.0, 1.0))

@@ -1,0 +1,70 @@
+"""What the browser's decoder of SSDFs must find, by Python: viewer/tests/ssdf_lighting.json.
+
+python -m tests.viewer.ssdf_fixture
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from assets_defs.workspace import CHECKOUT
+from pipelines.light.built_in_environments import sky
+from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
+from pipelines.ssdf_lighting.compression.decoder import Decoder
+from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
+from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
+from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
+from pipelines.ssdf_lighting.light.cosine_lobes import cosine_lobes
+from pipelines.ssdf_lighting.light.environment_fit import downsampled, fit_lights
+
+NAME = "ssdf_lighting.json"
+_SIDE = 8
+_VERTICES = 120
+_SHARPNESS = [3.0, 40.0, 300.0]
+_COLUMNS = [0, 100, 256, 300, 512]
+
+
+def values() -> dict[str, Any]:
+    """All values, as JSON has them."""
+    random = np.random.default_rng(7)
+    matrix = np.cumsum(random.normal(size=(_VERTICES, _SIDE**2)), axis=1).astype(np.float32) / 5
+    triangles = np.stack([np.arange(_VERTICES - 2) + k for k in range(3)], axis=1)
+    file = compress(matrix, triangles, clusters=7, rmse=0.05)
+    codes, decoder = from_bytes(file), Decoder.of_file(file)
+    lobes = cosine_lobes(_SHARPNESS)
+    environment = downsampled(sky(64, sun_azimuth=40.0, sun_elevation=35.0), 16)
+    environment = environment.astype(np.float16).astype(np.float64)
+    return {
+        "file": base64.b64encode(file).decode(),
+        "codes": _digest(
+            *(codes.shared, codes.shared_level, codes.centre, codes.basis, codes.level),
+            *(codes.ranks, codes.cluster, codes.weights),
+        ),
+        "step": codes.step,
+        "root_weight": root_weights(_SIDE**2).tolist(),
+        "distances": decoder.distances(np.arange(0, _VERTICES, 9)).round(6).tolist(),
+        "sharpness": _SHARPNESS,
+        "columns": _COLUMNS,
+        "axes": np.stack([lobes.along, lobes.up], axis=-1)[:, _COLUMNS].tolist(),
+        "matt": matt_rows(lobes)[:, ::256].tolist(),
+        "colours": cluster_colours(6).tolist(),
+        "environment": environment.ravel().tolist(),
+        "irradiance_error": fit_lights(
+            environment, 6, least_sharpness=3.0, most_sharpness=300.0
+        ).irradiance_error,
+    }
+
+
+def _digest(*arrays: Any) -> str:
+    """SHA-256 of whole numbers after one another, 32 bits each."""
+    whole = b"".join(np.ascontiguousarray(each, "<i4").tobytes() for each in arrays)
+    return hashlib.sha256(whole).hexdigest()
+
+
+if __name__ == "__main__":
+    (CHECKOUT / "viewer" / "tests" / NAME).write_text(json.dumps(values()) + "\n")
