@@ -21,8 +21,8 @@ _ROD_SIDES = 24
 _ROD_COLOUR = (0.30, 0.19, 0.10)
 _DOME_RADIUS = 14.0
 _DOME_COLUMNS, _DOME_ROWS = 48, 24
-_DOME_GLOW = (0.145, 0.150, 0.165)
-_DOME_DARK = (0.012, 0.013, 0.016)
+_DOME_GLOW = (0.052, 0.055, 0.064)
+_DOME_DARK = (0.009, 0.010, 0.012)
 
 
 class HangingCloth(NamedTuple):
@@ -60,7 +60,7 @@ def hanging_cloth(aspect: float) -> HangingCloth:
     sag = 0.075 * np.sin(math.pi * across) ** 2 * np.exp(-1.6 * down)
     height = _BOTTOM + (_TOP - _BOTTOM) * up - sag
     phase = 2.5 * math.pi * (across + 0.07 * np.sin(2.1 * height) - 0.1)
-    depth = (0.03 + 0.085 * down**0.8) * np.sin(phase)
+    depth = (0.03 + 0.07 * down**0.8) * np.sin(phase)
     depth += 0.022 * down * np.sin(1.9 * phase + 1.3) + 0.03 * down * across
     narrow = across * (1.0 - 0.06 * down * (1.0 - down) - 0.02 * down)
     points = np.stack([narrow, depth - 0.03, height], axis=-1)
@@ -102,8 +102,8 @@ def _dome() -> Surroundings:
     outward = np.stack(
         [np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)], axis=-1
     )
-    behind = np.clip(0.5 + 0.5 * (outward @ np.array([0.0, 0.98, -0.2])), 0.0, 1.0)
-    glow = behind[..., None] ** 9
+    behind = np.clip(0.5 + 0.5 * (outward @ np.array([-0.30, 0.95, -0.08])), 0.0, 1.0)
+    glow = behind[..., None] ** 14
     radiance = glow * np.array(_DOME_GLOW) + (1.0 - glow) * np.array(_DOME_DARK)
     return Surroundings(
         _rows(_DOME_RADIUS * outward), _grid(_DOME_ROWS + 1, _DOME_COLUMNS + 1), _rows(radiance)

@@ -28,7 +28,7 @@ from pipelines.neural_btf.surface_lookup import (
 )
 
 HOME = orbit((0.0, 0.0, -0.02), 4.0, -66.0, 4.0, view_angle=30.0)
-HOME_LIGHT = (-0.62, -0.62, 0.48)
+HOME_LIGHT = (-0.5, -0.75, 0.45)
 _SIDE_LIGHT = (0.96, -0.2, 0.2)
 _CLOSE = orbit((-0.25, 0.0, 0.1), 1.5, -100.0, 12.0, view_angle=30.0)
 _EXPOSED_WIDTH = 160

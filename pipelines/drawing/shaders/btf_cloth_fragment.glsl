@@ -12,9 +12,9 @@ in vec3 tangentOut;
 in vec2 materialPlace;
 in vec3 placeOut;
 
-// Latents of the texel at a place of the material, where a tile is 1. Rows count from the top, v from
-// the bottom. Vectors lie after one another, two texels each; where texels share them (SHARED), a
-// texture has the number of each texel's.
+// Latents of the texel at a place of the material, where a tile is 1. Rows count from the top, v
+// from the bottom. Vectors lie after one another, two texels each; where texels share them
+// (SHARED), a texture has the number of each texel's.
 void latentsAt(vec2 place, out vec4 latents[2]) {
   vec2 inside = fract(place);
   ivec2 size = ivec2(TEXELS);

@@ -1,6 +1,6 @@
 // The neural BTF's decoder (paper 1, figure 5): 8 latents and two directions to RGB over alpha by
-// three hidden layers of 106 neurons, padded to 27 vectors. A row of the texture is four neurons:
-// a texel an input and the bias in the last column, rows of a layer below those of the layer before.
+// three hidden layers of 106 neurons, padded to 27 vectors. A row of the texture is four neurons, a
+// texel of it an input, the last one the bias; a layer's rows follow those of the layer before.
 
 #include "stereographic.glsl"
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from assets_defs.workspace import CHECKOUT
 from pipelines.drawing.glsl import Shader, shader_source
 from pipelines.drawing.stage import Stage, orbit, surface, texture
 from pipelines.neural_btf.compressed import CompressedBtf
@@ -103,6 +105,28 @@ def test_the_shader_decodes_as_torch_and_numpy_do() -> None:
     np.testing.assert_allclose(found, by_torch, atol=MOST)
     swapped = made.radiance(np.arange(count), view, light) / made.alpha
     assert np.abs(found - swapped).max() > 0.01
+
+
+def written_decoder() -> dict[str, NDArray[np.float32]]:
+    """A decoder that a formula has, so that the viewer's test has the same."""
+    sizes = (12, 106, 106, 106, 3)
+    arrays: dict[str, NDArray[Any]] = {}
+    for layer in range(1, 5):
+        row, column = np.indices((sizes[layer], sizes[layer - 1]))
+        weight = 0.25 * np.sin(1.0 + 5.0 * layer + 1.7 * row + 0.9 * column * column)
+        bias = 0.2 * np.cos(3.0 * layer + 1.1 * np.arange(sizes[layer]))
+        arrays |= {f"weight_{layer}": weight, f"bias_{layer}": bias}
+    return {name: values.astype(np.float32) for name, values in arrays.items()}
+
+
+def test_the_viewers_test_knows_what_numpy_decodes() -> None:
+    stored = json.loads((CHECKOUT / "viewer" / "tests" / "neural_btf.json").read_text())
+    latents, light, view = (np.array(stored[key]) for key in ("latents", "light", "view"))
+    inputs = direction_inputs_of_vectors(light, view)
+    for n, colour in enumerate(stored["colour"]):
+        found = decode_in_numpy(written_decoder(), latents[n : n + 1], inputs[n : n + 1])[0, 0]
+        np.testing.assert_allclose(found, colour, atol=1e-5)
+    assert np.ptp(stored["colour"]) > 0.5
 
 
 def test_weights_and_latents_are_all_in_the_texels() -> None:

@@ -12,7 +12,6 @@ import { CONTROLS, withState, type Settings } from "./neural_btf/state";
 
 /** An orthographic camera is as far away as the stage's, in distances to its target. */
 const FAR_AWAY = 1e4;
-const HOME_LIGHT = [-0.62, -0.62, 0.48];
 
 /** What a package says of itself, for the drawer. */
 interface Material {
@@ -146,10 +145,8 @@ const viewer: SystemViewer = {
       latents: latents.length / 8,
       scale: pkg.parameter("alpha") * pkg.parameter("exposure"),
     };
-    const settings = withState(
-      { light: [0, 0, 1], tiles: 1, exposure: 0 },
-      { light: HOME_LIGHT, tiles: pkg.parameter("tiles") },
-    );
+    const inFront: Settings = { light: [0, -1, 0], tiles: pkg.parameter("tiles"), exposure: 0 };
+    const settings = withState(inFront, pkg.meta.views[0]?.state ?? {});
     return new HangingCloth(cloth, around, material, settings);
   },
 };

@@ -1,0 +1,95 @@
+/** The decoder's texels against what NumPy decodes, and the state of a cloth. */
+
+import { describe, expect, it } from "vitest";
+import { LAYERS, latentTexels, upsideDown, weightTexels, type Layer } from "../src/systems/neural_btf/decoder_texels";
+import { withState, type Settings } from "../src/systems/neural_btf/state";
+import { shaderSource } from "../src/shaders";
+import stored from "./neural_btf.json";
+
+/** As `written_decoder` of `tests/pipelines/neural_btf/test_stage_view.py`. */
+function writtenLayers(): Layer[] {
+  return [1, 2, 3, 4].map((layer) => {
+    const [inputs, outputs] = [LAYERS[layer - 1], LAYERS[layer]];
+    const weight = Float32Array.from({ length: inputs * outputs }, (_, n) => {
+      const [row, column] = [Math.floor(n / inputs), n % inputs];
+      return 0.25 * Math.sin(1 + 5 * layer + 1.7 * row + 0.9 * column * column);
+    });
+    const bias = Float32Array.from({ length: outputs }, (_, row) => 0.2 * Math.cos(3 * layer + 1.1 * row));
+    return { weight, bias };
+  });
+}
+
+/** What `btf_decoder.glsl` does, texel by texel. */
+function decoded(latents: number[], light: number[], view: number[]): number[] {
+  const { width, data } = weightTexels(writtenLayers());
+  const texel = (column: number, row: number) => Array.from(data.subarray((row * width + column) * 4, (row * width + column) * 4 + 4));
+  const neurons = (row: number, values: number[]) => {
+    const sum = texel(108, row);
+    values.forEach((value, column) => texel(column, row).forEach((weight, n) => (sum[n] += weight * value)));
+    return sum;
+  };
+  const place = ([x, y, z]: number[]) => [x / (1 + z), y / (1 + z)];
+  let values = [...latents, ...place(light), ...place(view)];
+  for (let layer = 0; layer < 3; layer++) {
+    const rows = Array.from({ length: 27 }, (_, row) => neurons(27 * layer + row, values));
+    values = rows.flat().map((value) => Math.max(value, 0));
+  }
+  return neurons(81, values).slice(0, 3);
+}
+
+describe("the decoder", () => {
+  it("decodes from its texels what NumPy decodes", () => {
+    stored.colour.forEach((colour, n) => {
+      const found = decoded(stored.latents[n], stored.light[n], stored.view[n]);
+      found.forEach((value, channel) => expect(value).toBeCloseTo(colour[channel], 4));
+    });
+    const swapped = decoded(stored.latents[0], stored.view[0], stored.light[0]);
+    expect(Math.abs(swapped[0] - stored.colour[0][0])).toBeGreaterThan(0.001);
+  });
+
+  it("has all weights in its texels, and nothing else", () => {
+    const { width, height, data } = weightTexels(writtenLayers());
+    expect([width, height]).toEqual([109, 82]);
+    const all = writtenLayers().flatMap(({ weight, bias }) => [...weight, ...bias]);
+    expect(all.length).toBe(24383);
+    const sum = (values: Iterable<number>) => [...values].reduce((so, value) => so + Math.abs(value), 0);
+    expect(sum(data)).toBeCloseTo(sum(all), 6);
+  });
+
+  it("is written for WebGL with its sums unrolled", () => {
+    const text = shaderSource("btf_decoder.glsl");
+    expect(text.match(/fourInputs\(4 \* \d+, row/g)?.length).toBe(27);
+  });
+});
+
+describe("latents", () => {
+  it("are lines of texels, two a vector", () => {
+    const latents = Float32Array.from({ length: 8 * 1500 }, (_, n) => n);
+    const { width, height, data } = latentTexels(latents);
+    expect([width, height]).toEqual([2048, 2]);
+    expect(Array.from(data.subarray(0, latents.length))).toEqual(Array.from(latents));
+  });
+
+  it("are turned for a texture whose rows count from the bottom", () => {
+    const picture = { width: 1, height: 3, channels: 2, data: Float32Array.of(0, 1, 2, 3, 4, 5) };
+    expect([...upsideDown(picture).data]).toEqual([4, 5, 2, 3, 0, 1]);
+  });
+});
+
+describe("the state", () => {
+  const settings: Settings = { light: [0, -1, 0], tiles: 4, exposure: 0 };
+
+  it("takes parts, and makes the light a unit vector", () => {
+    expect(withState(settings, { light: [0, 0, 5], exposure: -1.5 })).toEqual({ light: [0, 0, 1], tiles: 4, exposure: -1.5 });
+  });
+
+  it.each([
+    [{ light: [0, 0, 0] }, "light is [0,0,0]; expected [x, y, z]."],
+    [{ light: "up" }, 'light is "up"; expected [x, y, z].'],
+    [{ tiles: -1 }, "tiles is -1; expected a positive number."],
+    [{ exposure: null }, "exposure is null; expected a number."],
+    [{ fill: 1 }, "state has fill; expected light, tiles, exposure."],
+  ])("refuses %j", (state, sentence) => {
+    expect(() => withState(settings, state)).toThrow(sentence);
+  });
+});
