@@ -115,7 +115,7 @@ def glass_package(
     from storage.packages import write_package
     from storage.packages.glass_scratches import PACKAGE
 
-    light = _light_of(settings, lineage, float(glass_frames["exposure"]))
+    light = light_of(settings, lineage, float(glass_frames["exposure"]))
     glass = _Glass(
         solid_of(glass_object), material_of(scratch_table_2d, scratch_table, scratch_layers), light
     )
@@ -141,7 +141,7 @@ class _Light(NamedTuple):
     tile: float
 
 
-def _light_of(
+def light_of(
     settings: GlassPackageSettings, lineage: Sequence[Mapping[str, Any]], exposure: float
 ) -> _Light:
     """The frames' environment, made or read again, and the built-in ones.

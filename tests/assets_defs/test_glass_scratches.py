@@ -15,12 +15,13 @@ from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from pipelines.drawing import colour
 from pipelines.geometry import solid_shapes
-from pipelines.glass_scratches.drawing import frames
+from pipelines.glass_scratches.drawing import frames, live_parts, stage_view
 from pipelines.glass_scratches.layers import coverage, features, scratch_layers
 from pipelines.glass_scratches.tables import fresnel, profiles
 from pipelines.glass_scratches.tables import lobe as lobes
 from pipelines.glass_scratches.tables import scratch_table as tables
 from pipelines.glass_scratches.tables.radiosity import equation_1, leaving_share
+from storage.packages import encoding
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SETTING = {"setting": "setting-2"}
@@ -127,7 +128,8 @@ def test_a_profile_a_mesh_and_an_environment_of_the_users(make_house: Any, tmp_p
     assert {outcome.state for outcome in house.launcher.launch(request)} == {"current"}
     assert cv2.imwrite(str(sky), light * 2)
     again = house.launcher.launch(request)
-    assert [o.slot.asset for o in again if o.state == "made"] == ["glass_frames"]
+    made_again = [o.slot.asset for o in again if o.state == "made"]
+    assert made_again == ["glass_frames", "glass_package"]
 
 
 # ---- planted regressions ---------------------------------------------------------------------
@@ -213,6 +215,11 @@ def _furnace_times(factor: float) -> Callable[..., Any]:
     return wrong
 
 
+def _inside_out(right: Callable[..., Any], *arguments: Any) -> Any:
+    places, shading, facing = right(*arguments)
+    return places, shading, -facing
+
+
 REGRESSIONS = (
     Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
     Regression("aspect", profiles, "cut_profile", _nanometres_as_micrometres, SETTING),
@@ -252,6 +259,15 @@ REGRESSIONS = (
         lambda right, *arguments, **options: right(*arguments, **options) * np.float32(0.05),
         KEYS,
     ),
+    Regression(
+        "mismatches",
+        live_parts,
+        "coverage_codes",
+        lambda right, coverage: (coverage * 255).astype(np.uint8),
+        KEYS,
+    ),
+    Regression("mismatches", stage_view, "corners_apart", _inside_out, KEYS),
+    Regression("mismatches", encoding, "ktx2_bytes", lambda right, it: right(it[:, ::-1]), KEYS),
 )
 
 
