@@ -13,9 +13,10 @@ const MOVING = 40;
 const STRIP = 60;
 /** Milliseconds without a change after which a picture is still. */
 const STILL = 180;
-const LOWEST_SCALE = 0.2;
+const FEWEST_ROWS = 4;
+const LOWEST_SCALE = 0.125;
 /** Of the first frame, before it is known how long one takes. */
-const FIRST_SCALE = 0.35;
+const FIRST_SCALE = 0.2;
 /** Samples of a refined pixel lie on a grid of so many a side. */
 const SAMPLES_A_SIDE = 4;
 
@@ -31,6 +32,8 @@ export class Live {
   frameTime = 0;
   /** Where the second view begins, as a part of the width. */
   split = 0.5;
+  /** How far the picture's middle is moved to the right, as a part of the width. */
+  offset = 0;
   /** Called after each frame that was shown. */
   onFrame: () => void = () => {};
   /** Called with what went wrong in a frame. */
@@ -44,6 +47,7 @@ export class Live {
   private awake: (() => void) | undefined;
   private ended = false;
   private warm = false;
+  private pixelsAStrip = 20_000;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -146,13 +150,10 @@ export class Live {
       const loading = view.update?.(this.camera);
       loading?.catch((error: unknown) => this.onError(error));
     }
-    const [width, height] = this.size();
-    const size: [number, number] = [
-      Math.max(1, Math.round(width * this.scale)),
-      Math.max(1, Math.round(height * this.scale)),
-    ];
+    const size = this.sizeAt(this.scale);
+    const camera = this.cameraAt(size[0], [0, 0]);
     const begun = performance.now();
-    this.show(this.panes.map(({ view, frames }) => frames.draw(view, this.camera, ...size)), 1);
+    this.show(this.panes.map(({ view, frames }) => frames.draw(view, camera, ...size)), 1);
     await this.finished();
     this.frameTime = performance.now() - begun;
     this.onFrame();
@@ -167,15 +168,26 @@ export class Live {
     }
   }
 
-  /** Draws a still picture at full resolution, sample by sample, until something changes. */
+  /**
+   * Draws a still picture until something changes: at twice the resolution, and so on up to the
+   * full one, then sample by sample.
+   */
   private async refine(generation: number): Promise<void> {
     while (performance.now() - this.changed < STILL) {
       await nextFrame();
       if (generation !== this.generation || this.ended) return;
     }
     try {
+      for (let scale = 2 * this.scale; scale < 1; scale *= 2) {
+        const targets = await this.drawStrips(this.sizeAt(scale), [0, 0], generation);
+        if (!targets) return;
+        this.show(targets, 1);
+      }
       for (let sample = 0; sample < SAMPLES_A_SIDE ** 2; sample++) {
-        if (!(await this.drawSample(sample, generation))) return;
+        const targets = await this.drawStrips(this.size(), shiftOf(sample), generation);
+        if (!targets) return;
+        this.show(this.panes.map(({ frames }, i) => frames.accumulate(targets[i], sample === 0)), sample + 1);
+        this.onFrame();
       }
       this.refined = generation;
     } catch (error) {
@@ -183,22 +195,30 @@ export class Live {
     }
   }
 
-  private async drawSample(sample: number, generation: number): Promise<boolean> {
-    const [width, height] = this.size();
-    const camera = { ...this.camera, shift: shiftOf(sample) };
-    const moving = this.scale * this.scale;
-    const rows = Math.max(8, Math.floor((height * moving * STRIP) / Math.max(this.frameTime, 1)));
+  /** Draws a few rows after the other; undefined when something has changed meanwhile. */
+  private async drawStrips(
+    [width, height]: [number, number],
+    shift: [number, number],
+    generation: number,
+  ): Promise<WebGLRenderTarget[] | undefined> {
+    const camera = this.cameraAt(width, shift);
     let targets: WebGLRenderTarget[] = [];
-    for (let bottom = 0; bottom < height; bottom += rows) {
-      const strip = { bottom, top: Math.min(bottom + rows, height) };
-      targets = this.panes.map(({ view, frames }) => frames.draw(view, camera, width, height, strip));
+    for (let bottom = 0; bottom < height; ) {
+      const top = Math.min(height, bottom + Math.max(FEWEST_ROWS, Math.round(this.pixelsAStrip / width)));
+      const begun = performance.now();
+      targets = this.panes.map(({ view, frames }) => frames.draw(view, camera, width, height, { bottom, top }));
       await this.finished();
-      if (generation !== this.generation || this.ended) return false;
+      if (generation !== this.generation || this.ended) return undefined;
+      const pixels = (top - bottom) * width;
+      const wanted = (pixels * STRIP) / Math.max(performance.now() - begun, 1);
+      this.pixelsAStrip = Math.min(wanted, 4 * this.pixelsAStrip);
+      bottom = top;
     }
-    const sums = this.panes.map(({ frames }, i) => frames.accumulate(targets[i], sample === 0));
-    this.show(sums, sample + 1);
-    this.onFrame();
-    return true;
+    return targets;
+  }
+
+  private cameraAt(width: number, [right, down]: [number, number]): Camera {
+    return { ...this.camera, shift: [right + this.offset * width, down] };
   }
 
   private show(radiance: WebGLRenderTarget[], samples: number): void {
@@ -218,6 +238,11 @@ export class Live {
     const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     if (canvas.width !== width || canvas.height !== height) this.renderer.setSize(width, height, false);
     return [width, height];
+  }
+
+  private sizeAt(scale: number): [number, number] {
+    const [width, height] = this.size();
+    return [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
   }
 
   /** Waits until the graphics card has drawn all. */

@@ -61,13 +61,19 @@ export function framed(bounds: Bounds, aspect: number): Camera {
   return turned(start, 25, 20);
 }
 
-/** A camera made for a wide picture, gone back until a narrow one has all of `bounds`. */
-export function fitted(camera: Camera, bounds: Bounds, aspect: number): Camera {
-  if (aspect >= 1) return camera;
-  if (camera.height !== null) return { ...camera, height: Math.max(camera.height, (2 * bounds.radius) / aspect) };
+/**
+ * A camera made for a picture of aspect `from`, gone back for one of a narrower `aspect`: until it
+ * has all of `bounds`, or as much of the width as before.
+ */
+export function fitted(camera: Camera, bounds: Bounds, aspect: number, from = 4 / 3): Camera {
+  if (aspect >= from) return camera;
+  if (camera.height !== null) {
+    const needed = Math.min((2 * bounds.radius) / aspect, (camera.height * from) / aspect);
+    return { ...camera, height: Math.max(camera.height, needed) };
+  }
   const distance = new Vector3(...camera.position).distanceTo(new Vector3(...camera.target));
   const half = Math.atan(Math.tan(MathUtils.degToRad(camera.view_angle / 2)) * aspect);
-  const needed = Math.min(bounds.radius / Math.sin(half), distance / aspect);
+  const needed = Math.min(bounds.radius / Math.sin(half), (distance * from) / aspect);
   return needed > distance ? zoomed(camera, needed / distance, bounds) : camera;
 }
 

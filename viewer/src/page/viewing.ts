@@ -20,6 +20,7 @@ import type { Stage } from "./stage";
 const NOTED_AFTER = 400;
 /** Pixels of width up to which the page is a phone's, as the style sheet has it. */
 const NARROW = 640;
+const PANEL_WIDTH = 280;
 
 /** What the page of a package is given. */
 export interface Given {
@@ -82,10 +83,11 @@ export class Viewing {
       moved: () => this.changed(),
     });
     canvas.onkeyup = (event) => this.pressed(event);
-    this.resized = new ResizeObserver(() => this.live.change());
+    this.resized = new ResizeObserver(() => this.centre());
     this.resized.observe(canvas);
     this.live.onFrame = () => this.drawn();
     this.live.onError = (error) => say(sentenceOf(error));
+    this.panelPlace.ontoggle = () => this.centre();
     this.showPanel();
   }
 
@@ -149,12 +151,13 @@ export class Viewing {
   }
 
   private firstCamera(view: LiveView): Camera {
-    const { canvas } = this.given.stage;
-    const aspect = (canvas.clientWidth || window.innerWidth) / (canvas.clientHeight || window.innerHeight);
+    const panel = view.controls.length && window.innerWidth > NARROW ? PANEL_WIDTH : 0;
+    const aspect = (window.innerWidth - panel) / window.innerHeight;
     const reference = this.given.pkg.meta.views[0];
     const camera = view.home ?? reference?.camera;
     if (!camera) return framed(view.bounds, aspect);
-    return view.navigation === "orbit" ? fitted(camera, view.bounds, aspect) : camera;
+    if (view.navigation === "drive") return camera;
+    return fitted(camera, view.bounds, aspect, reference && reference.width / reference.height);
   }
 
   private bar(): HTMLElement {
@@ -230,6 +233,15 @@ export class Viewing {
     }, NOTED_AFTER);
   }
 
+  /** Has what is turned about in the middle of what the panel leaves free. */
+  private centre(): void {
+    const isBeside = this.panelPlace.open && !this.panelPlace.hidden && window.innerWidth > NARROW;
+    const isMoved = isBeside && this.live.view.navigation === "orbit" && !this.beside.length;
+    const { canvas } = this.given.stage;
+    this.live.offset = isMoved ? this.panelPlace.offsetWidth / 2 / canvas.clientWidth : 0;
+    this.live.change();
+  }
+
   private showPanel(): void {
     const { controls } = this.live.view;
     if (!this.panel || signature(controls) !== this.panelSignature) {
@@ -293,6 +305,7 @@ export class Viewing {
   private put(...elements: HTMLElement[]): void {
     this.beside = elements;
     this.frame.append(...elements);
+    this.centre();
   }
 
   private endComparison(): void {
@@ -300,6 +313,7 @@ export class Viewing {
     this.frame.classList.remove("fixed");
     if (this.live.other) this.live.compare(undefined);
     this.menu.value = "";
+    this.centre();
   }
 
   private async save(): Promise<void> {
