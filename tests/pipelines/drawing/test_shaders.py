@@ -27,7 +27,7 @@ from pipelines.street_billboards.textures.view_directions import fan_position
 
 FILES = sorted(path.name for path in SHADERS.iterdir())
 FUNCTIONS = [name for name in FILES if not name.endswith(("_vertex.glsl", "_fragment.glsl"))]
-FOR_OTHERS = {"octahedral.glsl"}
+FOR_OTHERS = {"lit_distances.glsl", "octahedral.glsl"}
 """No picture of the stage needs them: they are for who draws without it, and tested here."""
 
 _STREET: dict[str, Any] = {
@@ -70,7 +70,15 @@ _GLASS: dict[str, Any] = {
     "COVERED_B": [1.0, 1.0, 1.0, 1.0],
     "STRENGTH": 0.5,
 }
-_LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0}
+_DISTANCES: dict[str, Any] = {"LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5}
+CONSTANTS: dict[str, tuple[str, ...]] = {
+    "lit_lobes.glsl": ("LEAST_VIEW",),
+    "ssdf_lookup.glsl": ("SIDE",),
+    "lit_distances.glsl": ("LEAST_VIEW", "SIDE", "LIGHTS"),
+}
+"""Names in capitals of files of functions."""
+_LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0, "EDGES_FETCHED": False}
+_FETCHED: dict[str, Any] = {"EDGES_FETCHED": True, "EDGE_ROWS": 3}
 _GLOSSY: dict[str, Any] = {
     "LIGHTS": 24,
     "EDGES": 12,
@@ -91,6 +99,7 @@ _FUR_SHELL: dict[str, Any] = {
     "DECAY": 0.3,
     "THICKNESS": 0.1,
     "LAYERS": 10.0,
+    "SKY": 0.2,
     "HEADLIGHT": 0.4,
     "LAMP": 0.8,
     "LAMP_TOWARDS": [0.0, 0.6, 0.8],
@@ -116,6 +125,7 @@ STAGES: list[tuple[str, dict[str, Any]]] = [
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
     ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
     ("lit", _LIT | _GLOSSY),
+    ("lit", _LIT | _GLOSSY | _FETCHED),
     ("lit", _LIT | _TEXTURED | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
     ("lit", _LIT | _TEXTURED | _GLOSSY | _GRID),
     ("street", _STREET),
@@ -163,7 +173,8 @@ def compiled(folder: Path, sources: dict[str, str]) -> None:
 def test_a_file_of_functions_compiles_in_both_kinds_of_shaders(
     name: str, dialect: str, tmp_path: Path
 ) -> None:
-    source = _DIALECTS[dialect] + shader_source(name)
+    values = {constant: _DISTANCES[constant] for constant in CONSTANTS.get(name, ())}
+    source = _DIALECTS[dialect] + shader_source(name, **values)
     compiled(
         tmp_path,
         {
