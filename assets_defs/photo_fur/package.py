@@ -208,7 +208,15 @@ def _view(view: ReferenceView) -> View:
     from storage.packages import View
 
     height, width, _ = view.frame.shape
-    state = {**asdict(view.look), "light": list(view.look.light), "background": "grey"}
+    look = view.look
+    state = {
+        "layers": look.layers,
+        "thickness": look.thickness,
+        "fill": look.fill,
+        **asdict(look.light),
+        "light": list(look.light.light),
+        "background": "grey",
+    }
     camera = asdict(view.camera)
     return View(view.name, f"reference_{view.name}", width, height, SUPERSAMPLING, camera, state)
 

@@ -15,21 +15,31 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.glsl import shader_source
-from pipelines.drawing.stage import Camera, Light, Stage, Vector
+from pipelines.drawing.stage import Camera, Light, Stage
 from pipelines.photo_fur.attenuation import Tails
 from pipelines.photo_fur.frames import BACKGROUND, ROUND_VIEWS, View, view_cameras
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.shells import ShellMesh, shell_vertices
-from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.stage_view import (
+    LIVE_SHADERS,
+    Fill,
+    FurLight,
+    fur_surface,
+    fur_texture,
+    live_surface,
+)
 
 SUPERSAMPLING = 2
+NIGHT = (0.012, 0.013, 0.016)
+"""Linear radiance behind the fur of posters."""
 LAMP = (-0.48, -0.6, 0.64)
 """Where the lamp of close pictures and of the poster is: to the left of the front, above."""
 _SIDES = ("front", "right", "back", "left")
 _POSTER_VIEW = View(-62.0, 24.0)
 _CLOSE_VIEW = View(-70.0, 30.0)
 _CLOSE = 0.42
-"""Distance of close pictures, in distances from which all is seen."""
+_NEAR = 0.65
+"""Distances of these pictures, in distances from which all is seen."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +48,9 @@ class FurLook:
 
     layers: int
     fill: Fill
+    light: FurLight
     thickness: float = 1.0
     """In thicknesses of the mesh's own fur."""
-    headlight: float = 1.0
-    """Radiance of the lamp along the view."""
-    lamp: float = 0.0
-    """Radiance of the other lamp."""
-    light: Vector = LAMP
-    """Unit vector to it."""
 
 
 class ReferenceView(NamedTuple):
@@ -65,7 +70,7 @@ class FurScene:
         self.photograph, self.mesh, self.tails = photograph, mesh, tails
 
     def frame(self, look: FurLook, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
-        """A picture of size = (height, width) pixels, 8-bit sRGB."""
+        """A picture of size = (height, width) pixels, 8-bit sRGB, lit by the stage: without sky."""
         skin, height, width = self.mesh.vertices[-1], *size
         shells = shell_vertices(
             skin, self.mesh.normals, look.thickness * self.mesh.thickness, look.layers
@@ -86,8 +91,9 @@ class FurScene:
                     lit=True,
                 )
             )
+            light = look.light
             stage.light(
-                Light(colour=(look.headlight,) * 3), Light(look.light, colour=(look.lamp,) * 3)
+                Light(colour=(light.headlight,) * 3), Light(light.light, colour=(light.lamp,) * 3)
             )
             stage.look(camera)
             return stage.frame()
@@ -102,26 +108,48 @@ class FurScene:
         size: (height, width) of the pictures, pixels.
         """
         height, width = size
-        own = FurLook(self.mesh.layers, fill)
+        own = FurLook(self.mesh.layers, fill, FurLight(light=LAMP))
         aspect = width / height
         looks = [
             (name, own, camera)
             for name, camera in zip(_SIDES, self.cameras(ROUND_VIEWS, aspect), strict=True)
         ]
         (whole,) = self.cameras([_CLOSE_VIEW], aspect)
-        lit = FurLook(self.mesh.layers, fill, headlight=0.4, lamp=0.9)
-        others = FurLook(max(2, self.mesh.layers // 2), _other(fill), thickness=1.6)
-        looks += [("close", lit, _nearer(whole, _CLOSE)), ("other_shells", others, whole)]
+        lit = FurLook(self.mesh.layers, fill, FurLight(headlight=0.4, lamp=0.9, light=LAMP))
+        others = FurLook(max(2, self.mesh.layers // 2), _other(fill), own.light, thickness=1.6)
+        looks.append(("close", lit, _nearer(whole, _CLOSE)))
+        looks.append(("other_shells", others, _nearer(whole, _NEAR)))
         return tuple(
             ReferenceView(name, look, camera, self.frame(look, camera, size))
             for name, look, camera in looks
         )
 
+    def live_frame(self, look: FurLook, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """A picture of size = (height, width) pixels, 8-bit sRGB, as live views draw it."""
+        mesh, (height, width) = self.mesh, size
+        with Stage(width, height, background=NIGHT, supersampling=SUPERSAMPLING) as stage:
+            stage.add(
+                live_surface(
+                    mesh.vertices[-1],
+                    mesh.normals,
+                    mesh.triangles,
+                    mesh.uvs,
+                    fur_texture(self.photograph, look.layers, tails=self.tails),
+                    self.photograph.attenuation,
+                    layers=look.layers,
+                    thickness=look.thickness * mesh.thickness,
+                    fill=look.fill,
+                    light=look.light,
+                )
+            )
+            stage.look(camera)
+            return stage.frame()
+
     def poster(self, fill: Fill, size: tuple[int, int]) -> NDArray[np.uint8]:
         """What a live view shows at first, size = (height, width) pixels."""
         (camera,) = self.cameras([_POSTER_VIEW], size[1] / size[0])
-        look = FurLook(self.mesh.layers, fill, headlight=0.45, lamp=0.8)
-        return self.frame(look, camera, size)
+        light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=LAMP)
+        return self.live_frame(FurLook(self.mesh.layers, fill, light), camera, size)
 
 
 def luminance_part(photograph: FurPhotograph) -> NDArray[np.float32]:
@@ -141,7 +169,8 @@ def shell_sources() -> tuple[str, str]:
 
     Names in capitals are left to whoever compiles them.
     """
-    return shader_source("fur_shell_vertex.glsl"), shader_source("fur_shell_fragment.glsl")
+    vertex, fragment = LIVE_SHADERS
+    return shader_source(vertex), shader_source(fragment)
 
 
 def _other(fill: Fill) -> Fill:

@@ -12,6 +12,7 @@ down there: its colour times I(n) / I(own layer). From straight above both show 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -19,11 +20,27 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.glsl import surface_shader
-from pipelines.drawing.stage import Wrap, surface, texture
+from pipelines.drawing.stage import Vector, Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
 from pipelines.photo_fur.photograph import FurPhotograph
 
 Fill = Literal["columns", "bands"]
+LIVE_SHADERS = ("fur_shell_vertex.glsl", "fur_shell_fragment.glsl")
+"""Of vertices and fragments of shells that are lifted and lit by themselves."""
+
+
+@dataclass(frozen=True)
+class FurLight:
+    """The light of shells that light themselves."""
+
+    sky: float = 0.0
+    """Radiance from everywhere."""
+    headlight: float = 1.0
+    """Radiance of the lamp along the view."""
+    lamp: float = 0.0
+    """Radiance of the other lamp."""
+    light: Vector = (0.0, 0.0, 1.0)
+    """Unit vector to it."""
 
 
 def fur_texture(photograph: FurPhotograph, layers: int, *, tails: Tails) -> NDArray[np.uint8]:
@@ -83,4 +100,49 @@ def fur_surface(
             DECAY=attenuation.coefficient / layers,
         ),
         lit=lit,
+    )
+
+
+def live_surface(
+    skin: NDArray[np.float32],
+    normals: NDArray[np.floating],
+    triangles: NDArray[np.integer],
+    uvs: NDArray[np.floating],
+    image: NDArray[np.uint8],
+    attenuation: Attenuation,
+    *,
+    layers: int,
+    thickness: float,
+    fill: Fill,
+    light: FurLight,
+) -> Any:
+    """The fur as live views draw it, as one actor: the shader lifts the shells and lights them.
+
+    skin (V, 3), its normals (V, 3), triangles (F, 3), uvs (V, 2); image from ``fur_texture`` for
+    the same number of layers; thickness in units of the mesh.
+    """
+    count = len(skin)
+    offsets = count * np.arange(layers)[:, None, None]
+    return surface(
+        np.tile(skin, (layers, 1)),
+        (triangles[None] + offsets).reshape(-1, 3),
+        attributes={
+            "uv": np.tile(uvs, (layers, 1)),
+            "outward": np.tile(normals, (layers, 1)),
+            "layer": np.repeat(np.arange(1, layers + 1), count),
+        },
+        textures={"photograph": texture(image, wrap="mirrored", srgb=True)},
+        shader=surface_shader(
+            *LIVE_SHADERS,
+            CODE_STEPS=float(code_steps(layers)),
+            COLUMNS=fill == "columns",
+            DECAY=attenuation.coefficient / layers,
+            THICKNESS=float(thickness),
+            LAYERS=float(layers),
+            SKY=float(light.sky),
+            HEADLIGHT=float(light.headlight),
+            LAMP=float(light.lamp),
+            LAMP_TOWARDS=light.light,
+        ),
+        lit=False,
     )

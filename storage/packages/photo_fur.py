@@ -22,11 +22,12 @@ layer n has I(n) < L <= I(n-1); the first has all that is brighter, the last all
 where `tails` is "dropped", L outside [Imin, Imax] has the code 255; so has L < 0. Within the layer
 the code is (n - 1) s + min(floor(s clamp(N ln(Imax / L) / a - n + 1)), s - 1).
 
-**Light.** The surface is Lambertian, with the colours as albedo, seen from both sides, and casts no
-shadows. Reference pictures have a lamp along the view of radiance `headlight` of their state, and
-one towards `light` of radiance `lamp`; a fragment shows its colour times (headlight max(n·v, 0) +
-lamp max(n·l, 0)), with v the view's axis and n the shading normal, turned to the viewer. Where no
-fur is they show `background`. `pipelines/drawing/shaders/fur_*.glsl` does all of it.
+**Light.** The surface is Lambertian, with the colours as albedo, seen from both sides, and casts
+no shadows. The state of a reference picture has the radiance of an even `sky`, of a lamp along
+the view, `headlight`, and of one towards `light`, `lamp`; a fragment shows its colour times (sky
++ headlight max(n·v, 0) + lamp max(n·l, 0)), with v the view's axis and n the shading normal,
+turned to the viewer. Where no fur is they show `background`.
+`pipelines/drawing/shaders/fur_*.glsl` does it all.
 """
 
 PACKAGE = PackageSchema(

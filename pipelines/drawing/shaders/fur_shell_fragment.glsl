@@ -1,5 +1,5 @@
-// Fur: the radiance of a shell, Lambertian, under a lamp along the view of radiance HEADLIGHT and one
-// of radiance LAMP. What it shows of the photograph is as in fur_fragment.glsl.
+// Fur: the radiance of a shell, Lambertian, under an even SKY, a lamp along the view of radiance
+// HEADLIGHT and one of radiance LAMP. What it shows of the photograph is as in fur_fragment.glsl.
 
 #include "fur_layer.glsl"
 
@@ -14,5 +14,6 @@ vec3 surfaceColour() {
   if (hair.a == 0.0) discard;
   vec3 facing = normalize(outwardOut);
   if (!gl_FrontFacing) facing = -facing;
-  return hair.rgb * (HEADLIGHT * max(facing.z, 0.0) + LAMP * max(dot(facing, lampOut), 0.0));
+  float lamps = HEADLIGHT * max(facing.z, 0.0) + LAMP * max(dot(facing, lampOut), 0.0);
+  return hair.rgb * (SKY + lamps);
 }

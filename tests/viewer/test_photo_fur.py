@@ -1,0 +1,141 @@
+"""Fur in the browser: the stage's pictures, and what can be set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from assets_defs.launcher import Request
+from assets_defs.photo_fur.graph import FUR
+from storage.packages import Package, read_package
+from tests.assets_defs.conftest import house, make_house
+
+__all__ = ["house", "make_house"]
+KEYS = {"photo": "chelsea", "mesh": "teapot"}
+LEAST_PSNR = 40.0
+SMALL = (64, 48)
+
+
+@pytest.fixture(scope="module")
+def package(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A package of preset `test`."""
+    house.launcher.launch(Request(FUR, [KEYS], preset="test"))
+    dataset = house.workspace.store.open(FUR.slot("fur_package", KEYS))
+    path: Path = tmp_path_factory.mktemp("package") / "fur.tsuya"
+    path.write_bytes(dataset["file"].values.tobytes())
+    return path
+
+
+@pytest.fixture
+def opened(package: Path) -> Package:
+    return read_package(package)
+
+
+def _difference(one: Any, other: Any) -> float:
+    """Mean difference in 8-bit codes."""
+    return float(np.abs(one.astype(np.float64) - other).mean())
+
+
+def test_pictures_are_the_stages(
+    package: Path, opened: Package, open_viewer: Callable[..., Any]
+) -> None:
+    viewer = open_viewer(package).ready()
+    views = {view["name"]: view for view in opened.meta["views"]}
+    assert list(views) == ["front", "right", "back", "left", "close", "other_shells"]
+    for name, view in views.items():
+        assert viewer.psnr(opened, view) >= LEAST_PSNR, name
+    nulls: list[dict[str, Any]] = [
+        {"layers": 3},
+        {"thickness": 0.5},
+        {"fill": "bands"},
+        {"headlight": 0.8},
+        {"light": [0.48, -0.6, 0.64]},
+        {"background": "night"},
+    ]
+    for null in nulls:
+        # Where all of the picture is fur another background changes nothing.
+        view = views["front" if "background" in null else "close"]
+        assert viewer.psnr(opened, view, **null) < LEAST_PSNR - 8, null
+
+
+def test_other_numbers_of_layers_have_the_stages_codes(
+    package: Path, opened: Package, open_viewer: Callable[..., Any]
+) -> None:
+    """The codes of the package's own number are exact; those of others are made in the page."""
+    viewer = open_viewer(package).ready()
+    view = next(view for view in opened.meta["views"] if view["name"] == "other_shells")
+    asked = sum(1 for request in viewer.requests)
+    assert viewer.psnr(opened, view) >= LEAST_PSNR
+    viewer.set_view(state={"layers": opened.parameter("layers")})
+    viewer.capture(*SMALL)
+    assert viewer.psnr(opened, view) >= LEAST_PSNR
+    assert len(viewer.requests) > asked  # the luminance was read when it was needed
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"layers": 4},
+        {"thickness": 2.5},
+        {"fill": "bands"},
+        {"headlight": 0.0},
+        {"lamp": 0.0},
+        {"light": [0.9, 0.3, 0.3]},
+        {"background": "paper"},
+    ],
+    ids=lambda changed: next(iter(changed)),
+)
+def test_what_is_set_changes_the_picture(
+    changed: dict[str, Any], package: Path, open_viewer: Callable[..., Any]
+) -> None:
+    viewer = open_viewer(package).ready()
+    before = viewer.capture(*SMALL)
+    assert np.array_equal(viewer.capture(*SMALL), before)
+    viewer.set_view(state=changed)
+    assert _difference(viewer.capture(*SMALL), before) > 0.3
+    (name,) = changed
+    found = viewer.evaluate("() => window.tsuya.view().state")[name]
+    same = (
+        found == changed[name]
+        if isinstance(found, str)
+        else np.allclose(found, changed[name], atol=0.01)
+    )
+    assert same
+
+
+def test_dragging_walks_around(package: Path, open_viewer: Callable[..., Any]) -> None:
+    viewer = open_viewer(package).ready()
+    before = viewer.evaluate("() => window.tsuya.view().camera.position")
+    mouse = viewer.page.mouse
+    mouse.move(400, 250)
+    mouse.down()
+    mouse.move(520, 250, steps=4)
+    mouse.up()
+    viewer.wait_for(
+        f"() => Math.abs(window.tsuya.view().camera.position[0] - ({before[0]})) > 0.01"
+    )
+    after = viewer.evaluate("() => window.tsuya.view().camera.position")
+    assert np.isclose(after[2], before[2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        ({"layers": 0}, "layers is 0; expected a whole number of 1 to 250."),
+        ({"fill": "waves"}, 'fill is "waves"; expected one of columns, bands.'),
+        ({"light": [0, 0, 0]}, "light is [0,0,0]; expected [x, y, z]."),
+        ({"thickness": -1}, "thickness is -1; expected 0 or more."),
+    ],
+    ids=["layers", "fill", "light", "thickness"],
+)
+def test_what_cannot_be_is_refused(
+    state: dict[str, Any], said: str, package: Path, open_viewer: Callable[..., Any]
+) -> None:
+    viewer = open_viewer(package).ready()
+    with pytest.raises(Exception) as raised:
+        viewer.set_view(state=state)
+    assert said in str(raised.value)
