@@ -12,7 +12,9 @@ import pytest
 from assets_defs.launcher import Request
 from assets_defs.neural_btf.graph import BTF
 from storage.packages import read_package
+from tests.assets_defs.conftest import house, make_house
 
+__all__ = ["house", "make_house"]
 WITHOUT = {"material": "knit", "clusters": "none"}
 CLUSTERED = WITHOUT | {"clusters": "20"}
 LEAST_PSNR = 40.0

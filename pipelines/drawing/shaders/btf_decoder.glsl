@@ -5,6 +5,9 @@
 #include "stereographic.glsl"
 
 uniform sampler2D weights;
+// What a layer is given, and what it says. As arguments, arrays would be copied for each row.
+vec4 given[27];
+vec4 said[27];
 
 // Four neurons' share of four inputs, the first of which is in this column.
 vec4 fourInputs(int column, int row, vec4 values) {
@@ -14,12 +17,12 @@ vec4 fourInputs(int column, int row, vec4 values) {
               texelFetch(weights, ivec2(column + 3, row), 0)) * values;
 }
 
-// Four neurons of all that a hidden layer says.
-vec4 fourNeurons(int row, vec4 values[27]) {
+// Four neurons of what a hidden layer gave.
+vec4 fourNeurons(int row) {
   vec4 sum = texelFetch(weights, ivec2(108, row), 0);
 #pragma unroll_loop_start
   for (int i = 0; i < 27; i++) {
-    sum += fourInputs(4 * i, row, values[i]);
+    sum += fourInputs(4 * i, row, given[i]);
   }
 #pragma unroll_loop_end
   return sum;
@@ -28,20 +31,19 @@ vec4 fourNeurons(int row, vec4 values[27]) {
 // latents: the first and the last four. Directions are unit vectors in the texture's frame, z >= 0.
 vec3 decodedColour(vec4 latents[2], vec3 light, vec3 view) {
   vec4 directions = vec4(stereographicPlace(light), stereographicPlace(view));
-  vec4 before[27], after[27];
   for (int row = 0; row < 27; row++) {
-    before[row] = max(texelFetch(weights, ivec2(108, row), 0) + fourInputs(0, row, latents[0]) +
-                      fourInputs(4, row, latents[1]) + fourInputs(8, row, directions), 0.0);
+    given[row] = max(texelFetch(weights, ivec2(108, row), 0) + fourInputs(0, row, latents[0]) +
+                     fourInputs(4, row, latents[1]) + fourInputs(8, row, directions), 0.0);
   }
   // One loop for all layers: the unrolled sum is long to compile.
   vec4 sum;
   for (int layer = 1; layer < 4; layer++) {
     int rows = layer < 3 ? 27 : 1;
     for (int row = 0; row < rows; row++) {
-      sum = fourNeurons(27 * layer + row, before);
-      after[row] = max(sum, 0.0);
+      sum = fourNeurons(27 * layer + row);
+      said[row] = max(sum, 0.0);
     }
-    before = after;
+    given = said;
   }
   return sum.rgb;
 }
