@@ -28,7 +28,7 @@ MOST_LAYERS = 8
 LIGHTS = 64
 LAMP_EDGE = (math.cos(math.radians(2.5)), math.cos(math.radians(1.2)))
 """Cosines to the middle of a lamp between which its radiance rises from nothing to all."""
-LAMP_COLOUR = (1.0, 0.93, 0.8)
+LAMP_COLOUR = (1.0, 0.82, 0.55)
 
 
 class Lamp(NamedTuple):

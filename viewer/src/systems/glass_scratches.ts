@@ -16,7 +16,7 @@ const DROPPED = "yours";
 /** An orthographic camera is as far away as the stage's, in distances to its target. */
 const FAR_AWAY = 1e4;
 /** A dark set: the lamps' room is dimmed, one of them stands behind the glass, the lamp beside it. */
-const DARK_SET = { turn: -84, brightness: 0.18, tilt: 14, lamp: 4 };
+const DARK_SET = { turn: -84, brightness: 0.18, tilt: 14, lamp: 7 };
 const BRIGHT_SET = { turn: 0, brightness: 1, tilt: 0, lamp: 2 };
 const HOME_LIGHT: [number, number, number] = [0.64, 0.48, 0.6];
 const UP = new THREE.Vector3(0, 0, 1);
@@ -24,7 +24,7 @@ const UP = new THREE.Vector3(0, 0, 1);
 class ScratchedGlass implements LiveView {
   readonly navigation = "orbit";
   readonly bounds: Bounds = { centre: [0, 0, 0], radius: 1 };
-  readonly home = orbit([0, 0, 0], 2.9, -75, 1, { view_angle: 36 });
+  readonly home = orbit([0, 0, 0], 2.7, -75, 1, { view_angle: 36 });
   private readonly scene = new THREE.Scene();
   private readonly surroundings: Surroundings;
 
