@@ -143,7 +143,7 @@ def street_package(
 
 
 def _title(keys: Mapping[str, str]) -> str:
-    return f"street of {keys['drive']}"
+    return f"{keys['drive']} street"
 
 
 def _sources(settings: StreetPackageSettings, keys: Mapping[str, str]) -> list[Source]:

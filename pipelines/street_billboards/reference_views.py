@@ -16,9 +16,9 @@ from pipelines.street_billboards.drawing.street_stage import StreetStage, flight
 from pipelines.street_billboards.street_model import StreetModel
 
 FloatArray = NDArray[np.float64]
-SUPERSAMPLING = 2
-_FIRST = 2
-"""Frame of the first view: nobody before it saw the ground that it looks at."""
+SUPERSAMPLING = 3
+_FIRST = 5
+"""Frame of the first view: enough photographs before it saw what it looks at."""
 
 
 class Lens(NamedTuple):
@@ -60,7 +60,7 @@ def reference_views(street: StreetModel, poses: FloatArray, lens: Lens) -> list[
 
     Raises ``drawing.stage.NoGraphicsError`` where nothing can be drawn.
     """
-    first, middle = min(_FIRST, len(poses) - 1), len(poses) // 2
+    first, middle = min(_FIRST, len(poses) // 2), len(poses) // 2
     between = flight_poses(poses, 2 * len(poses) - 1, 0.0)[2 * middle - 1]
     photographed = [
         ("on the path", poses[first]),
@@ -76,7 +76,7 @@ def reference_views(street: StreetModel, poses: FloatArray, lens: Lens) -> list[
 
 def poster(street: StreetModel, poses: FloatArray, lens: Lens) -> NDArray[np.uint8]:
     """The street from a metre beside its path, (y, x, 3) in sRGB."""
-    pose = moved_left(poses[min(_FIRST, len(poses) - 1)], 1.0)
+    pose = moved_left(poses[min(_FIRST, len(poses) // 2)], 1.0)
     return _drawn(street, [("poster", pose)], lens)[0].frame
 
 

@@ -13,13 +13,13 @@ float scattered(vec3 place) {
 // Linear light, all hues about as bright.
 vec3 colourOfBillboard(vec3 centre) {
   vec3 turn = 6.28318530718 * (scattered(centre) + vec3(0.0, 0.3333333, 0.6666667));
-  return 0.26 + 0.22 * cos(turn);
+  return 0.25 + 0.17 * cos(turn);
 }
 
 // Whether a place in a billboard, 0 to 1, is at its rim.
 bool atRim(vec2 place) {
   vec2 inside = min(place, 1.0 - place);
-  return min(inside.x, inside.y) < 0.012;
+  return min(inside.x, inside.y) < 0.008;
 }
 
 vec3 rimOf(vec3 centre) {

@@ -22,6 +22,8 @@ const SILENT_FRAMES = 2;
 /** By how much a narrow window's view may be wider than the photographs'. */
 const WIDEST = 1.5;
 
+/** Vectors that a vertex hands on beside a tile's weights, billboards shown. */
+const OTHER_VARYINGS = 5;
 const CHOICES: Record<string, string[]> = { show: ["street", "billboards"], camera: ["road", "free"] };
 
 /** Camera and tiles of one package. */
@@ -182,6 +184,17 @@ function firstCamera(path: Path, viewAngle: number): Camera {
   return { position: position.toArray(), target: target.toArray(), up: [0, 0, 1], view_angle: viewAngle, height: null };
 }
 
+/** The paper's form hands more from vertex to fragment than some graphics cards can. */
+function checkVaryings(pkg: Package, { renderer }: Context): void {
+  const gl = renderer.getContext();
+  const most = gl.getParameter(gl.MAX_VARYING_VECTORS) as number;
+  const { detailTiles, tintTiles } = codingOf(pkg);
+  const needed = OTHER_VARYINGS + detailTiles + tintTiles;
+  if (needed > most) {
+    throw new Error(`${pkg.name}: its billboards hand ${needed} vectors to a fragment; this graphics card has ${most}.`);
+  }
+}
+
 async function make(pkg: Package, context: Context): Promise<LiveView> {
   const [places, poses, heldOut, sky] = await Promise.all([
     tilePlaces(pkg),
@@ -189,6 +202,8 @@ async function make(pkg: Package, context: Context): Promise<LiveView> {
     pkg.array("path_held_out"),
     pkg.floats("sky"),
   ]);
+  if (poses.length < 16 || !places.length) throw new Error(`${pkg.name}: path or tiles are empty; expected a street.`);
+  checkVaryings(pkg, context);
   const [height, width] = pkg.shape("sky");
   const path = new Path(poses);
   const behind = new Sky(texture({ width, height, channels: 3, data: sky }));
