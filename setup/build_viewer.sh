@@ -21,5 +21,8 @@ fi
 echo "Building the viewer …"
 rm -rf dist.new
 node node_modules/vite/bin/vite.js build --logLevel warn --outDir dist.new
-rm -rf dist
-mv dist.new dist
+# File by file, the page last: whoever is looking at it meets no folder that is half there.
+mkdir -p dist
+mv dist.new/viewer.js dist.new/viewer.css dist/
+mv dist.new/index.html dist/
+rmdir dist.new
