@@ -101,12 +101,13 @@ export class Viewing {
   /** Settled with the first frame that is shown. */
   firstFrame(): Promise<void> {
     return new Promise((resolve, reject) => {
+      const say = this.live.onError;
       this.live.onFrame = () => {
+        this.live.onError = say;
         this.live.onFrame = () => this.drawn();
         this.drawn();
         resolve();
       };
-      const say = this.live.onError;
       this.live.onError = (error) => {
         this.live.onError = say;
         reject(error);
@@ -355,6 +356,7 @@ function driveButtons(canvas: HTMLCanvasElement): HTMLElement {
     };
     made.onpointerup = made.onpointercancel = () => send("keyup");
     made.oncontextmenu = (event) => event.preventDefault();
+    made.onmousedown = (event) => event.preventDefault(); // the canvas keeps the focus, or its keys are let go
     return made;
   };
   return element(
