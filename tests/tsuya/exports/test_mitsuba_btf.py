@@ -1,0 +1,143 @@
+"""The plug-in `tsuya_btf`: sampling, values, and a picture against the stage's."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_erosion
+
+from pipelines.drawing.colour import auto_exposure, to_8bit
+from pipelines.drawing.stage import orbit
+from pipelines.light.directions import all_pairs, hemisphere_table, unit_vectors
+from pipelines.neural_btf.compressed import CompressedBtf
+from pipelines.neural_btf.compression import compress_photographs
+from pipelines.neural_btf.panel import draw_frames, folded_panel, moving_lights
+from pipelines.neural_btf.training.plan import TrainingPlan
+from storage.packages import Mesh
+from tests.tsuya.exports.bsdf_sampling import draw, integrate, interaction, mitsuba, p_value
+from tsuya.exports.mitsuba.btf import plug_in_arrays, write_btf_folder
+
+VIEWS = unit_vectors(np.radians([[5, 0], [35, 130], [60, -70], [80, 20]]))
+SIGNIFICANCE = 0.01
+"""That a right plug-in fails any of the tests of a case."""
+
+
+@functools.cache
+def cloth() -> CompressedBtf:
+    """Texels of several colours and slopes, matt and glossy."""
+    rng = np.random.default_rng(4)
+    pairs = all_pairs(hemisphere_table(15), hemisphere_table(15))
+    light, view = unit_vectors(pairs.light), unit_vectors(pairs.view)
+    half = light + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    normals = np.dstack([rng.uniform(-0.3, 0.3, (6, 8, 2)), np.ones((6, 8))])
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    matt = np.maximum(np.einsum("nk,yxk->nyx", light, normals), 0.0)
+    gloss = np.maximum(np.einsum("nk,yxk->nyx", half, normals), 0.0) ** 40
+    photographs = matt[..., None] * (rng.uniform(0.1, 0.9, (6, 8, 3)) + gloss[..., None])
+    return compress_photographs(photographs, pairs, plan=TrainingPlan(steps=150))
+
+
+@pytest.fixture(scope="module")
+def bsdf(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    mi = mitsuba()
+    importlib.import_module("tsuya.exports.mitsuba.tsuya_btf")
+    path = tmp_path_factory.mktemp("btf") / "data.npz"
+    np.savez(path, **plug_in_arrays(cloth()))
+    return mi.load_dict({"type": "tsuya_btf", "filename": str(path), "tiles": 2.0})
+
+
+def test_samples_are_those_of_the_density(bsdf: Any) -> None:
+    found = [
+        (draw(bsdf, si, 6000, seed), integrate(bsdf, si).density)
+        for si in map(interaction, VIEWS)
+        for seed in (1, 2)
+    ]
+    bound = 1 - (1 - SIGNIFICANCE) ** (1 / len(found))
+    assert all(p_value(drawn, density) > bound for drawn, density in found)
+    # Its null: samples of one view are not those of another.
+    assert p_value(found[0][0], found[4][1]) < 1e-6
+
+
+def test_weights_are_value_over_density_and_keep_energy(bsdf: Any) -> None:
+    mi = mitsuba()
+    for view in VIEWS:
+        si = interaction(view, uv=(0.3, 0.7))
+        drawn, of_all = draw(bsdf, si, 6000, 5), integrate(bsdf, si)
+        assert drawn.is_valid.all()
+        assert of_all.density.sum() == pytest.approx(1.0, abs=2e-3)
+        assert of_all.density[: len(of_all.density) // 2].sum() == 0  # below the surface
+        for number in range(100):
+            value, density = bsdf.eval_pdf(
+                mi.BSDFContext(), si, mi.Vector3f(*drawn.directions[number])
+            )
+            assert density == pytest.approx(drawn.densities[number], rel=1e-4)
+            assert np.allclose(np.array(value) / density, drawn.weights[number], rtol=1e-3)
+        albedo = of_all.value.sum(axis=0)
+        assert (albedo > 0).all()
+        error = drawn.weights.std(axis=0) / math.sqrt(len(drawn.weights))
+        assert (np.abs(drawn.weights.mean(axis=0) - albedo) < 4.5 * error + 0.005 * albedo).all()
+
+
+def test_at_a_low_view_fitted_shares_leave_less_noise_than_the_cosine(bsdf: Any) -> None:
+    drawn = draw(bsdf, interaction(VIEWS[2], uv=(0.3, 0.7)), 2000, 6)
+    weights = drawn.weights.mean(axis=1)
+    # The variance of samples by the cosine, from these by their chances.
+    chance = drawn.directions[:, 2] / np.pi / drawn.densities
+    by_cosine = np.mean(weights**2 / chance) - np.mean(weights) ** 2
+    assert weights.var() < 0.8 * by_cosine
+
+
+def test_values_are_the_decoders(bsdf: Any) -> None:
+    mi, btf, rng = mitsuba(), cloth(), np.random.default_rng(9)
+    light, view = (
+        unit_vectors(np.stack([np.arccos(rng.uniform(0.27, 1, 40)), rng.uniform(0, 6.28, 40)], -1))
+        for _ in range(2)
+    )
+    uvs = rng.random((40, 2))
+    column = np.floor(uvs[:, 0] * 2 % 1 * btf.width).astype(int)
+    row = btf.height - 1 - np.floor(uvs[:, 1] * 2 % 1 * btf.height).astype(int)
+    expected = np.maximum(btf.radiance(row * btf.width + column, light, view), 0) / np.pi
+    swapped = np.maximum(btf.radiance(row * btf.width + column, view, light), 0) / np.pi
+    context = mi.BSDFContext()
+    found = np.array(
+        [
+            bsdf.eval(context, interaction(v, uv=uv), mi.Vector3f(*towards))
+            for towards, v, uv in zip(light, view, uvs, strict=True)
+        ]
+    )
+    assert np.allclose(found, expected, atol=1e-5)
+    assert not np.allclose(found, swapped, atol=1e-2)
+    below = interaction(-view[0])
+    assert not np.array(bsdf.eval(context, below, mi.Vector3f(*light[0]))).any()
+
+
+@pytest.mark.reads_back("mitsuba")
+def test_the_cloth_looks_like_the_stages(tmp_path: Path) -> None:
+    mi, btf, width, tiles = mitsuba(), cloth(), 96, 1.0
+    panel = folded_panel(tiles, btf.height / btf.width)
+    mesh = Mesh(panel.vertices, panel.triangles, panel.normals, panel.uvs)
+    camera = orbit((0.0, 0.0, 0.0), 3.6, -90.0, 62.0, view_angle=24.0)
+    lights = moving_lights(8)
+    towards = unit_vectors(lights[0]).tolist()
+    write_btf_folder(btf, mesh, tmp_path, camera=camera, light=towards, tiles=1.0, exposure=1.0)
+    size = {"width": str(width), "height": str(width * 3 // 4), "samples": "16"}
+    plugged = np.array(mi.render(mi.load_file(str(tmp_path / "scene.xml"), **size)), np.float64)
+    inside = binary_erosion(plugged.max(axis=2) > 0, iterations=2)
+    assert inside.mean() > 0.5
+    shown = to_8bit(plugged * auto_exposure(plugged[inside].astype(np.float32))).astype(float)
+
+    def psnr(light: int) -> float:
+        own = draw_frames(
+            btf, lights[light : light + 1], width=width, tiles=tiles, supersampling=4
+        ).pictures[0]
+        return float(10 * np.log10(255**2 / np.mean((shown - own)[inside] ** 2)))
+
+    assert psnr(0) >= 35
+    assert psnr(2) < 25  # its null: the light a quarter further round
