@@ -28,7 +28,9 @@ LIGHTS = Lights(
         [[0.6, 0.0, 0.8], [0.0, -0.8, 0.6], [-0.6, 0.64, 0.48], [0.0, 0.0, 1.0], [0.8, 0, 0.6]]
     ),
     np.array([120.0, 8.0, 4.0, 3.0, 30.0]),
-    np.array([[9.0, 8.0, 6.0], [0.5, 0.6, 0.9], [0.4, 0.4, 0.6], [0.3, 0.3, 0.3], [1.0, 2.0, 0.5]]),
+    np.array(
+        [[60.0, 50.0, 40.0], [0.5, 0.6, 0.9], [0.4, 0.4, 0.6], [0.3, 0.3, 0.3], [1.0, 2.0, 0.5]]
+    ),
 )
 
 
@@ -63,7 +65,7 @@ def scene(*, textured: bool = False) -> Scene:
 
 def tops(places: np.ndarray) -> np.ndarray:
     """The middles (V, 3) of the halves of the sky that are seen at places (V, 3)."""
-    leaning = places * [0.5, 0.5, 0.0] + [0.0, 0.0, 1.0]
+    leaning = places * [2.5, 2.5, 0.0] + [0.0, 0.0, 1.0]
     return np.asarray(leaning / np.linalg.norm(leaning, axis=1, keepdims=True))
 
 
@@ -75,7 +77,7 @@ def distances(lit_scene: Scene, n: int = 32) -> np.ndarray:
 
 def inputs(lit_scene: Scene, n: int = 32) -> Any:
     """What the package's asset packs."""
-    file = compress(distances(lit_scene, n), lit_scene.triangles, clusters=3, rmse=0.004)
+    file = compress(distances(lit_scene, n), lit_scene.triangles, clusters=24, rmse=0.01)
     counts = {"raw": 0, "file": len(file), "memory": 0}
     basis = xr.Dataset(
         {
@@ -93,7 +95,7 @@ def inputs(lit_scene: Scene, n: int = 32) -> Any:
         lights_dataset(
             sky(64, sun_azimuth=40.0, sun_elevation=35.0), Fit(LIGHTS, 0.1, 0.1, 0.01), 0.0, "sky"
         ),
-        0.4,
+        0.5,
     )
 
 

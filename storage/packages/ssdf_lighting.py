@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from storage.packages.schema import ArrayPart, MeshPart, PackageSchema, Parameter, PicturePart
+from storage.packages.schema import (
+    ArrayPart,
+    MeshPart,
+    PackageSchema,
+    Parameter,
+    Part,
+    PicturePart,
+)
 
 _DECODING = """\
 Directions are unit vectors, z up. The scene's middle is the origin, its radius 1.
@@ -42,7 +49,7 @@ glTF's. Beckmann's slope is the roughness squared.
 Radiance times `exposure` is what the reference pictures show, before the colour `background`.
 """
 
-_VARYING = {
+_VARYING: dict[str, Part] = {
     "varying": ArrayPart(
         ("varying",), "int32", "1", "Row of each material that varies", optional=True
     ),
@@ -74,7 +81,7 @@ _VARYING = {
     "map_*": PicturePart("Texels of a map, by its number", units="code", optional=True),
 }
 
-_PAPERS_FORM = {
+_PAPERS_FORM: dict[str, Part] = {
     "vectors": ArrayPart(
         ("value", "direction"),
         "float16",

@@ -32,7 +32,8 @@ _COLUMNS = [0, 100, 256, 300, 512]
 def values() -> dict[str, Any]:
     """All values, as JSON has them."""
     random = np.random.default_rng(7)
-    matrix = np.cumsum(random.normal(size=(_VERTICES, _SIDE**2)), axis=1).astype(np.float32) / 5
+    walk = np.cumsum(random.normal(size=(_VERTICES, _SIDE**2)), axis=1)
+    matrix = np.asarray(walk.astype(np.float32) / 5, np.float32)
     triangles = np.stack([np.arange(_VERTICES - 2) + k for k in range(3)], axis=1)
     file = compress(matrix, triangles, clusters=7, rmse=0.05)
     codes, decoder = from_bytes(file), Decoder.of_file(file)

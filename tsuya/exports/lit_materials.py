@@ -92,7 +92,7 @@ def scene_glb(package: Package, sky: NDArray[np.float32]) -> bytes:
     mesh, glb = package.mesh("mesh"), GlbFile()
     assert mesh.normals is not None
     assert mesh.uvs is not None
-    attributes = {
+    attributes: dict[str, NDArray[Any]] = {
         "POSITION": mesh.vertices,
         "NORMAL": mesh.normals,
         "TEXCOORD_0": mesh.uvs * [1, -1] + [0, 1],

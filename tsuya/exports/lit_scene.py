@@ -9,7 +9,7 @@ from storage.packages import Package
 from tsuya.exports.format import Format, Notes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from pipelines.ssdf_lighting.compression.decoder_tables import DecoderTables
 
 _SHADERS = ("lit_vertex.glsl", "lit_fragment.glsl", "lit_distances.glsl")
 _LINE = 4
@@ -45,7 +45,8 @@ def write_glb(package: Package, target: Path) -> Notes:
     (target / "glsl").mkdir(parents=True)
     (target / "scene.glb").write_bytes(scene_glb(package, sky_shares(package, tables)))
     (target / "README.txt").write_text(_README)
-    lights = {name: package.array(f"light_{name}") for name in ("axes", "sharpness", "amplitudes")}
+    names = ("axes", "sharpness", "amplitudes")
+    lights: dict[str, Any] = {name: package.array(f"light_{name}") for name in names}
     np.savez_compressed(target / "lights.npz", **lights)
     np.savez_compressed(target / "distances.npz", **texels(tables))
     for name in _with_included(SHADERS, _SHADERS):
@@ -56,7 +57,7 @@ def write_glb(package: Package, target: Path) -> Notes:
     )
 
 
-def texels(tables: Any) -> dict[str, NDArray[Any]]:
+def texels(tables: DecoderTables) -> dict[str, Any]:
     """Lines of texels (T, 4) of ``DecoderTables``, as `ssdf_lookup.glsl` reads them."""
     import numpy as np
 

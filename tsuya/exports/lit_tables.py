@@ -29,7 +29,7 @@ def decoder_tables(package: Package) -> DecoderTables:
     names = ("vectors", "first", "row_vertex", "row_first", "weights")
     parts = {name: package.array(name) for name in names}
     parts |= {name: parts[name].astype(np.float32) for name in ("vectors", "weights")}
-    pca = ClusteredPca(*parts.values(), np.zeros(len(parts["first"]) - 1))
+    pca = ClusteredPca(**parts, relative_error=np.zeros(len(parts["first"]) - 1))
     return Decoder.of_pca(pca, int(parts["row_vertex"].max()) + 1).tables
 
 

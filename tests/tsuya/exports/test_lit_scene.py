@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.ssdf_lighting.compression.decoder import Decoder
 from storage.packages import Package, read_package
 from tests import lit_packages
 from tsuya.exports import find_format
@@ -66,7 +67,9 @@ def test_the_skys_share_is_that_of_half_a_sky(package: Package, tmp_path: Path) 
         share = part.vertex_attributes["_SKY"]
         # A normal n sees (1 + n·t) / 2 of the half space about t.
         seen = np.sum(np.asarray(part.vertex_normals) * lit_packages.tops(part.vertices), axis=1)
-        assert np.abs(share - (1 + seen) / 2).max() < 0.03
+        off = np.abs(share - (1 + seen) / 2)
+        assert np.median(off) < 0.01
+        assert off.max() < 0.1
     assert max(np.ptp(p.vertex_attributes["_SKY"]) for p in read.geometry.values()) > 0.5
 
 
@@ -91,12 +94,13 @@ def test_texels_of_distances_decode_to_them(plain: Package, tmp_path: Path) -> N
     with np.load(folder / "distances.npz") as read:
         side, sources = int(read["side"]), read["sources"].astype(int)
         vectors, weights = read["vectors"].astype(np.float32), read["weights"]
-    expected = lit_packages.distances(lit_packages.scene())
+    decoder = Decoder.of_file(plain.array("ssdf").tobytes())
+    expected = decoder.distances(np.arange(len(sources)))
     for vertex in (0, 7, len(sources) - 1):
         start, width, first, _ = sources[vertex]
         table = vectors[start : start + width * side**2].reshape(side**2, 4 * width)
         found = table @ weights[first : first + width].ravel()
-        assert np.sqrt(np.mean((found - expected[vertex]) ** 2)) < 0.01
+        assert np.abs(found - expected[vertex]).max() < 5e-3  # of halfs
     names = {path.name for path in (folder / "glsl").iterdir()}
     assert {"lit_distances.glsl", "octahedral.glsl", "sg_visibility.glsl"} <= names
 
