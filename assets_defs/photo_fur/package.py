@@ -204,7 +204,6 @@ def _parameters(settings: FurPackageSettings, scene: FurScene) -> dict[str, Any]
 
 
 def _view(view: ReferenceView) -> View:
-    from pipelines.photo_fur.live_parts import SUPERSAMPLING
     from storage.packages import View
 
     height, width, _ = view.frame.shape
@@ -218,7 +217,9 @@ def _view(view: ReferenceView) -> View:
         "background": "grey",
     }
     camera = asdict(view.camera)
-    return View(view.name, f"reference_{view.name}", width, height, SUPERSAMPLING, camera, state)
+    return View(
+        view.name, f"reference_{view.name}", width, height, view.supersampling, camera, state
+    )
 
 
 def _sources(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.glsl import shader_source
-from pipelines.drawing.stage import Camera, Light, Stage
+from pipelines.drawing.stage import Camera, Light, Stage, Vector
 from pipelines.photo_fur.attenuation import Tails
 from pipelines.photo_fur.frames import BACKGROUND, ROUND_VIEWS, View, view_cameras
 from pipelines.photo_fur.photograph import FurPhotograph
@@ -30,6 +30,8 @@ from pipelines.photo_fur.stage_view import (
 )
 
 SUPERSAMPLING = 2
+_FINE = 4
+"""Of bands: whether a sample of theirs is seen hangs on the last digit of a filtered depth."""
 NIGHT = (0.012, 0.013, 0.016)
 """Linear radiance behind the fur of posters."""
 LAMP = (-0.48, -0.6, 0.64)
@@ -59,6 +61,8 @@ class ReferenceView(NamedTuple):
     name: str
     look: FurLook
     camera: Camera
+    supersampling: int
+    """Samples along each side of a pixel."""
     frame: NDArray[np.uint8]
     """(y, x, 3), sRGB."""
 
@@ -69,14 +73,20 @@ class FurScene:
     def __init__(self, photograph: FurPhotograph, mesh: ShellMesh, tails: Tails) -> None:
         self.photograph, self.mesh, self.tails = photograph, mesh, tails
 
-    def frame(self, look: FurLook, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def frame(
+        self,
+        look: FurLook,
+        camera: Camera,
+        size: tuple[int, int],
+        supersampling: int = SUPERSAMPLING,
+    ) -> NDArray[np.uint8]:
         """A picture of size = (height, width) pixels, 8-bit sRGB, lit by the stage: without sky."""
         skin, height, width = self.mesh.vertices[-1], *size
         shells = shell_vertices(
             skin, self.mesh.normals, look.thickness * self.mesh.thickness, look.layers
         )
         image = fur_texture(self.photograph, look.layers, tails=self.tails)
-        with Stage(width, height, background=BACKGROUND, supersampling=SUPERSAMPLING) as stage:
+        with Stage(width, height, background=BACKGROUND, supersampling=supersampling) as stage:
             stage.add(
                 fur_surface(
                     shells,
@@ -110,24 +120,30 @@ class FurScene:
         height, width = size
         own = FurLook(self.mesh.layers, fill, FurLight(light=LAMP))
         aspect = width / height
-        looks = [
-            (name, own, camera)
+        taken = [
+            (name, own, camera, SUPERSAMPLING)
             for name, camera in zip(_SIDES, self.cameras(ROUND_VIEWS, aspect), strict=True)
         ]
         (whole,) = self.cameras([_CLOSE_VIEW], aspect)
         lit = FurLook(self.mesh.layers, fill, FurLight(headlight=0.4, lamp=0.9, light=LAMP))
         others = FurLook(max(2, self.mesh.layers // 2), _other(fill), own.light, thickness=1.6)
-        looks.append(("close", lit, _nearer(whole, _CLOSE)))
-        looks.append(("other_shells", others, _nearer(whole, _NEAR)))
+        taken.append(("close", lit, _nearer(whole, _CLOSE), SUPERSAMPLING))
+        taken.append(("other_shells", others, _nearer(whole, _NEAR), _FINE))
         return tuple(
-            ReferenceView(name, look, camera, self.frame(look, camera, size))
-            for name, look, camera in looks
+            ReferenceView(name, look, camera, samples, self.frame(look, camera, size, samples))
+            for name, look, camera, samples in taken
         )
 
-    def live_frame(self, look: FurLook, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def live_frame(
+        self,
+        look: FurLook,
+        camera: Camera,
+        size: tuple[int, int],
+        background: Vector = NIGHT,
+    ) -> NDArray[np.uint8]:
         """A picture of size = (height, width) pixels, 8-bit sRGB, as live views draw it."""
         mesh, (height, width) = self.mesh, size
-        with Stage(width, height, background=NIGHT, supersampling=SUPERSAMPLING) as stage:
+        with Stage(width, height, background=background, supersampling=SUPERSAMPLING) as stage:
             stage.add(
                 live_surface(
                     mesh.vertices[-1],

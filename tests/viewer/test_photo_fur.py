@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Error
 
 from assets_defs.launcher import Request
 from assets_defs.photo_fur.graph import FUR
 from storage.packages import Package, read_package
 from tests.assets_defs.conftest import house, make_house
+from tests.viewer import photo_fur_codes
 
 __all__ = ["house", "make_house"]
 KEYS = {"photo": "chelsea", "mesh": "teapot"}
@@ -53,6 +57,7 @@ def test_pictures_are_the_stages(
         {"thickness": 0.5},
         {"fill": "bands"},
         {"headlight": 0.8},
+        {"sky": 0.2},
         {"light": [0.48, -0.6, 0.64]},
         {"background": "night"},
     ]
@@ -83,6 +88,7 @@ def test_other_numbers_of_layers_have_the_stages_codes(
         {"thickness": 2.5},
         {"fill": "bands"},
         {"headlight": 0.0},
+        {"sky": 0.6},
         {"lamp": 0.0},
         {"light": [0.9, 0.3, 0.3]},
         {"background": "paper"},
@@ -136,6 +142,9 @@ def test_what_cannot_be_is_refused(
     state: dict[str, Any], said: str, package: Path, open_viewer: Callable[..., Any]
 ) -> None:
     viewer = open_viewer(package).ready()
-    with pytest.raises(Exception) as raised:
+    with pytest.raises(Error, match=re.escape(said)):
         viewer.set_view(state=state)
-    assert said in str(raised.value)
+
+
+def test_values_for_the_viewers_own_tests_are_pythons() -> None:
+    assert json.loads(photo_fur_codes.PATH.read_text()) == photo_fur_codes.values()

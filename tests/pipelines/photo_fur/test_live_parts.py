@@ -1,0 +1,97 @@
+"""What live views are given, and shells that are lifted and lit by their shader."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.drawing.colour import decode_srgb, encode_srgb
+from pipelines.geometry.shapes import sphere
+from pipelines.photo_fur.frames import BACKGROUND
+from pipelines.photo_fur.live_parts import (
+    LAMP,
+    NIGHT,
+    FurLook,
+    FurScene,
+    input_picture,
+    luminance_part,
+    shell_sources,
+)
+from pipelines.photo_fur.shells import make_shell_mesh
+from pipelines.photo_fur.stage_view import Fill, FurLight
+from tests.fur_packages import tufts
+
+SIZE = (96, 128)
+LIT = FurLight(headlight=0.4, lamp=0.9, light=LAMP)
+
+
+@pytest.fixture(scope="module")
+def scene() -> FurScene:
+    mesh = make_shell_mesh(sphere(16), 6, thickness=0.2, repeats=0.4)
+    return FurScene(tufts(), mesh, "end layers")
+
+
+def _psnr(one: np.ndarray, other: np.ndarray) -> float:
+    error = np.mean((one.astype(np.float64) - other) ** 2)
+    return float(10 * np.log10(255**2 / max(error, 1e-9)))
+
+
+@pytest.mark.parametrize("fill", ["columns", "bands"])
+def test_shells_that_light_themselves_are_the_stages(scene: FurScene, fill: Fill) -> None:
+    """VTK offsets nothing and lights nothing here: the shader does both."""
+    camera = scene.reference_views(fill, (12, 16))[4].camera  # close: all of the picture is fur
+    look = FurLook(9, fill, LIT, thickness=1.4)
+    expected = scene.frame(look, camera, SIZE)
+    assert _psnr(scene.live_frame(look, camera, SIZE, BACKGROUND), expected) > 45
+    for null in (
+        replace(look, thickness=1.0),
+        replace(look, layers=6),
+        replace(look, light=replace(LIT, light=(0.6, 0.6, 0.52))),
+        replace(look, light=replace(LIT, headlight=0.5)),
+    ):
+        assert _psnr(scene.live_frame(null, camera, SIZE, BACKGROUND), expected) < 37
+
+
+def test_a_sky_lights_all_alike(scene: FurScene) -> None:
+    camera = scene.reference_views("columns", (12, 16))[0].camera
+    look = FurLook(6, "columns", FurLight(sky=1.0, headlight=0.0))
+    whole = decode_srgb(scene.live_frame(look, camera, SIZE) / 255.0)
+    half = scene.live_frame(replace(look, light=FurLight(sky=0.5, headlight=0.0)), camera, SIZE)
+    is_fur = np.abs(whole - NIGHT).max(axis=2) > 0.01
+    assert 0.1 < is_fur.mean() < 0.9
+    inner = is_fur & np.roll(is_fur, 1, 0) & np.roll(is_fur, -1, 0)
+    inner &= np.roll(is_fur, 1, 1) & np.roll(is_fur, -1, 1)
+    # Rims mix with the background.
+    differing = np.abs(half / 255.0 - encode_srgb(whole / 2)).max(axis=2)[inner]
+    assert np.quantile(differing, 0.9) < 1.5 / 255
+
+
+def test_reference_views_show_each_setting_changed(scene: FurScene) -> None:
+    views = {view.name: view for view in scene.reference_views("columns", (24, 32))}
+    assert list(views) == ["front", "right", "back", "left", "close", "other_shells"]
+    assert {view.look.layers for view in views.values()} == {6, 3}
+    assert views["other_shells"].look.fill == "bands"
+    assert views["close"].look.light.lamp > 0
+    assert all(view.frame.shape == (24, 32, 3) for view in views.values())
+    assert len({view.frame.tobytes() for view in views.values()}) == len(views)
+
+
+def test_transparent_pixels_have_no_luminance(scene: FurScene) -> None:
+    photograph = scene.photograph
+    assert photograph.opaque is not None
+    luminance = luminance_part(photograph)
+    assert luminance.dtype == np.float32
+    assert np.array_equal(luminance < 0, ~photograph.opaque)
+    assert np.array_equal(luminance[photograph.opaque], photograph.luminance[photograph.opaque])
+    shown = input_picture(photograph)
+    expected = np.rint(255 * encode_srgb(np.array(BACKGROUND)))
+    assert (shown[~photograph.opaque] == expected).all()
+
+
+def test_sources_stand_by_themselves() -> None:
+    vertex, fragment = shell_sources()
+    assert "#include" not in vertex + fragment
+    assert "void placeVertex()" in vertex
+    assert "vec3 surfaceColour()" in fragment
