@@ -14,7 +14,14 @@ from assets_defs.photo_fur.datasets import LOADERS
 from assets_defs.photo_fur.graph import FUR
 from pipelines.geometry import shapes
 from pipelines.geometry.meshes import Mesh
-from pipelines.photo_fur import attenuation, frames, photograph, shells, stage_view
+from pipelines.photo_fur import (
+    attenuation,
+    frames,
+    live_parts,
+    photograph,
+    shells,
+    stage_view,
+)
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
 from storage.stored_version import StoredVersion
@@ -210,6 +217,13 @@ REGRESSIONS = (
     Regression("outward_share", shapes, "teapot", _inside_out_teapot, PELT_KEYS),
     Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
     Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),
+    Regression(
+        "mismatches",
+        live_parts,
+        "luminance_part",
+        lambda right, photo: right(photo) * np.float32(1.0001),
+        KEYS,
+    ),
     Regression(
         "mean_brightness", frames, "to_8bit", lambda right, picture: right(picture * 0.8), KEYS
     ),
