@@ -22,6 +22,7 @@ import click
 
 from assets_defs.picture_links import HOST
 from assets_defs.viewer_files import HEADERS, PAGE_FILES, VIEWER
+from storage.errors import StoreError
 from storage.versions import Slot, VersionedStore
 from tsuya.console import SetUpError
 from tsuya.keys import parse_key
@@ -109,8 +110,12 @@ def view_app(
             raise HTTPException(404)
         place = offered[number].place
         if isinstance(place, Slot):
-            with reading:
-                place = _kept(store, place, kept / f"{number}{SUFFIX}")
+            try:
+                with reading:
+                    place = _kept(store, place, kept / f"{number}{SUFFIX}")
+            except StoreError as error:
+                click.echo(str(error), err=True)
+                raise HTTPException(404) from error
         if not place.is_file():
             raise HTTPException(404)
         return FileResponse(place, headers=HEADERS, media_type="application/octet-stream")
@@ -153,7 +158,7 @@ def serve(store: VersionedStore, keys: Sequence[str]) -> None:
         if _has_screen():
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         config = uvicorn.Config(
-            app, log_level="warning", access_log=False, timeout_graceful_shutdown=1
+            app, log_level="critical", access_log=False, timeout_graceful_shutdown=1
         )
         try:
             uvicorn.Server(config).run(sockets=[listener])

@@ -125,6 +125,21 @@ def test_a_package_of_the_store_is_served_by_the_key_of_its_frames(
     assert asked.get("/token/packages/0.tsuya").content == package.read_bytes()
 
 
+def test_a_damaged_package_of_the_store_is_named_in_the_terminal(
+    tmp_path: Path, page: Path, package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = VersionedStore(tmp_path / "store")
+    slot = Slot("glass_scratches", "glass_package", "wine.ring")
+    content = np.frombuffer(package.read_bytes(), np.uint8)
+    record = {"settings": {}, "recipe": "of a test", "checks": []}
+    store.write(slot, xr.Dataset({"file": ("byte", content)}), record)
+    chunks = [path for path in store.folder(slot).rglob("c/*") if path.is_file()]
+    chunks[0].unlink()
+    asked = client(tmp_path, [Offered(str(slot), slot)])
+    assert asked.get("/token/packages/0.tsuya").status_code == 404
+    assert "expected what was written" in capsys.readouterr().err
+
+
 def test_what_cannot_be_shown_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = VersionedStore(tmp_path / "store")
     with pytest.raises(ValueError, match="holds no package; expected some"):
