@@ -205,7 +205,7 @@ def _views(
                 *lens.size,
                 SUPERSAMPLING,
                 asdict(view.camera),
-                {"show": "billboards" if view.billboards else "street", "path": False},
+                {"show": "street", "path": False},
             ),
             view.frame,
         )

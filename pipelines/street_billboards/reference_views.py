@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,37 +56,39 @@ def lens_of(intrinsics: FloatArray, size: tuple[int, int], width: int) -> Lens:
 
 
 def reference_views(street: StreetModel, poses: FloatArray, lens: Lens) -> list[ReferenceView]:
-    """On the path of a drive (f, 4, 4), between its frames, beside it, and what it is made of.
+    """On the path of a drive (f, 4, 4), between its frames, and beside it.
 
     Raises ``drawing.stage.NoGraphicsError`` where nothing can be drawn.
     """
     first, middle = min(_FIRST, len(poses) // 2), len(poses) // 2
     between = flight_poses(poses, 2 * len(poses) - 1, 0.0)[2 * middle - 1]
-    photographed = [
+    named = [
         ("on the path", poses[first]),
         ("between two frames", between),
         ("1 m beside", moved_left(poses[middle], 1.0)),
         ("2 m beside", moved_left(poses[first], 2.0)),
     ]
-    return [
-        *_drawn(street, photographed, lens),
-        *_drawn(street, [("billboards", poses[first])], lens, billboards=True),
-    ]
+    return drawn_views(street, named, lens)
 
 
 def poster(street: StreetModel, poses: FloatArray, lens: Lens) -> NDArray[np.uint8]:
     """The street from a metre beside its path, (y, x, 3) in sRGB."""
     pose = moved_left(poses[min(_FIRST, len(poses) // 2)], 1.0)
-    return _drawn(street, [("poster", pose)], lens)[0].frame
+    return drawn_views(street, [("poster", pose)], lens)[0].frame
 
 
-def _drawn(
+def drawn_views(
     street: StreetModel,
-    named: Sequence[tuple[str, Any]],
+    named: Sequence[tuple[str, FloatArray]],
     lens: Lens,
     *,
     billboards: bool = False,
 ) -> list[ReferenceView]:
+    """Frames from poses (4, 4) with names; billboards: shown in colours of their own.
+
+    Of two billboards in nearly one plane rounding decides which is in front: what they show is the
+    same, their own colours are not.
+    """
     with StreetStage(
         street.billboards,
         street.pages,

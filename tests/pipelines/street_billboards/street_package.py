@@ -9,7 +9,12 @@ import numpy as np
 
 from pipelines.street_billboards.billboards import Billboards
 from pipelines.street_billboards.live_tiles import live_tiles, tile_textures
-from pipelines.street_billboards.reference_views import SUPERSAMPLING, lens_of, reference_views
+from pipelines.street_billboards.reference_views import (
+    SUPERSAMPLING,
+    drawn_views,
+    lens_of,
+    reference_views,
+)
 from pipelines.street_billboards.street_model import StreetModel
 from pipelines.street_billboards.textures.atlases import pack_pages
 from pipelines.street_billboards.textures.texture_tables import CompressedTextures
@@ -57,6 +62,8 @@ def street_package(
     tiles = live_tiles(billboards, made, poses[:, :3, 3], tile_metres)
     lens = np.array([[_FOCAL, 0, (SIZE[0] - 1) / 2], [0, _FOCAL, (SIZE[1] - 1) / 2], [0, 0, 1.0]])
     views = reference_views(street, poses, lens_of(lens, SIZE, SIZE[0]))
+    shown = [("billboards", poses[len(poses) // 2])]
+    views += drawn_views(street, shown, lens_of(lens, SIZE, SIZE[0]), billboards=True)
     values: dict[str, Any] = {
         "tile_billboards": np.array([len(tile.rows) for tile in tiles], np.uint32),
         "tile_stretch": np.array([tile.stretch for tile in tiles], np.float32),
@@ -80,7 +87,7 @@ def street_package(
         "view_angle": views[0].camera.view_angle,
         "leaf": 0.8,
     }
-    shown = [
+    told = [
         View(
             view.name,
             f"reference_{number}",
@@ -91,5 +98,5 @@ def street_package(
         )
         for number, view in enumerate(views)
     ]
-    contents = Contents("street of squares", [Source("random")], values, parameters, shown)
+    contents = Contents("street of squares", [Source("random")], values, parameters, told)
     return MadeStreet(write_package(PACKAGE, contents), billboards, made, len(tiles))
