@@ -180,7 +180,7 @@ def test_the_cloth_hangs_and_its_vectors_are_the_surfaces() -> None:
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     assert (facing[:, 1] < 0).all()
     means = cloth.normals[cloth.triangles].mean(axis=1)
-    assert np.sum(facing * means, axis=1).min() > 0.99
+    assert np.sum(facing * means, axis=1).min() > 0.97
     np.testing.assert_allclose(np.linalg.norm(cloth.tangents, axis=1), 1, atol=1e-6)
     assert (cloth.tangents[:, 0] > 0.4).all()
     # The material keeps its shape: as far along u as along v, within what folds stretch.
