@@ -86,7 +86,7 @@ def fit_svbrdf(
         # Weighted back by the scale, so that the sum is over radiance again.
         loss = (((1 + residual**2).sqrt() - 1) * scale**2).sum(dim=0).mean()
         optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         optimiser.step()
         falling.step()
     with torch.no_grad():

@@ -43,7 +43,7 @@ def write_scratches(package: Package, target: Path) -> Notes:
     arrays = {name: package.array(name) for name in ("table", "leaning", "angles")}
     arrays["coverage"] = package.textures("coverage")[..., 0]
     arrays |= {
-        name: np.float64(package.parameter(parameter))
+        name: np.array(package.parameter(parameter), np.float64)
         for name, parameter in (
             ("index", "refractive_index"), ("roughness", "roughness"), ("tile", "tile"),
         )

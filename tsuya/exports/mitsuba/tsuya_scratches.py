@@ -297,7 +297,7 @@ class TsuyaScratches(mi.BSDF):
         if key != last_key:
             last = self.glass.lobes(key[:3], key[3:6], si.sh_frame)
             self._last = (key, last)
-        return last  # type: ignore[no-any-return]
+        return last
 
     def _reflected_chance(self, lobe: Lobe, view: Any) -> tuple[float, float, float]:
         """From outside: F, the share that the table gives back, the chance to be sampled."""
