@@ -71,6 +71,7 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "shell_stack": {"fur_photo", "attenuation"},
         "shell_mesh": set(),
         "fur_frames": {"fur_photo", "attenuation", "shell_mesh"},
+        "fur_package": {"fur_photo", "attenuation", "shell_mesh"},
     }
     assert _parents(house, BTF) == {
         "btf_images": set(),

@@ -63,6 +63,7 @@ def test_a_run_reports_figures_sizes_and_versions(made: dict[str, Any], home: Pa
         "photo_fur/shell_stack/grass",
         "photo_fur/shell_mesh/square",
         "photo_fur/fur_frames/square.grass",
+        "photo_fur/fur_package/square.grass",
     }
     frames = assets["photo_fur/fur_frames/square.grass"]
     assert frames["figures"]["top_view_rmse"] <= 0.02
