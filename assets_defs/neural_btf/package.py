@@ -50,7 +50,7 @@ class BtfPackageSettings(PackageSettings):
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"view_width": 64, "poster_width": 96, "cloth_tiles": 1.5},
+        "test": {"view_width": 64, "poster_width": 96, "cloth_tiles": 1.0},
     }
 
 

@@ -48,7 +48,7 @@ def test_pictures_are_the_stages(
     views = package.meta["views"]
     for view in views:
         assert viewer.psnr(package, view) >= LEAST_PSNR, view["name"]
-    nulls: list[dict[str, Any]] = [{"light": [0.3, -0.9, 0.3]}, {"tiles": 4.05}, {"exposure": 0.2}]
+    nulls: list[dict[str, Any]] = [{"light": [0.3, -0.9, 0.3]}, {"tiles": 4.05}, {"exposure": 0.4}]
     for null in nulls:
         assert viewer.psnr(package, views[0], **null) < LEAST_PSNR - 8, null
 
