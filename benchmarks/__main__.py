@@ -14,7 +14,18 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-NAMES = ("btf", "captures", "contents", "faults", "fur", "house", "scratches", "ssdf", "street")
+NAMES = (
+    "btf",
+    "captures",
+    "contents",
+    "faults",
+    "fur",
+    "house",
+    "packages",
+    "scratches",
+    "ssdf",
+    "street",
+)
 SCALES = ("default", "paper")
 
 
