@@ -117,7 +117,7 @@ def test_an_environment_of_ones_own(
     before = viewer.capture(*SMALL)
     drop = "input[name=file]"
     viewer.page.set_input_files(drop, str(_hdr(tmp_path / "same.hdr", 7 * lamps)))
-    viewer.page.wait_for_function("window.tsuya.view().state.environment === 'yours'")
+    viewer.wait_for("() => window.tsuya.view().state.environment === 'yours'")
     assert _difference(viewer.capture(*SMALL), before) < 1.0  # RGBE has 8 bits of each number
     blue = np.zeros((32, 64, 3), np.uint8)
     blue[..., 0] = 255
