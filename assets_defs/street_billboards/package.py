@@ -110,6 +110,7 @@ def street_package(
     settings: StreetPackageSettings,
     keys: Mapping[str, str],
     lineage: Sequence[Mapping[str, Any]],
+    *,
     drive_frames: xr.Dataset,
     depth_maps: xr.Dataset,
     billboards: xr.Dataset,
