@@ -83,12 +83,17 @@ def test_weights_are_value_over_density_and_keep_energy(bsdf: Any) -> None:
 
 
 def test_at_a_low_view_fitted_shares_leave_less_noise_than_the_cosine(bsdf: Any) -> None:
-    drawn = draw(bsdf, interaction(VIEWS[2], uv=(0.3, 0.7)), 2000, 6)
-    weights = drawn.weights.mean(axis=1)
-    # The variance of samples by the cosine, from these by their chances.
-    chance = drawn.directions[:, 2] / np.pi / drawn.densities
-    by_cosine = np.mean(weights**2 / chance) - np.mean(weights) ** 2
-    assert weights.var() < 0.8 * by_cosine
+    rng = np.random.default_rng(0)
+    (view,) = unit_vectors(np.radians([[70.0, 20.0]]))
+    variance, by_cosine = [], []
+    for _ in range(30):
+        drawn = draw(bsdf, interaction(view, uv=rng.random(2)), 150, int(rng.integers(1 << 30)))
+        weights = drawn.weights.mean(axis=1)
+        variance.append(weights.var())
+        # That of samples by the cosine, from these by their chances.
+        chance = drawn.directions[:, 2] / np.pi / drawn.densities
+        by_cosine.append(np.mean(weights**2 / chance) - np.mean(weights) ** 2)
+    assert np.mean(variance) < 0.85 * np.mean(by_cosine)
 
 
 def test_values_are_the_decoders(bsdf: Any) -> None:
