@@ -8,9 +8,15 @@ import numpy as np
 import xarray as xr
 
 from assets_defs.ssdf_lighting import package as lit
-from assets_defs.ssdf_lighting.datasets import lights_dataset, scene_dataset
+from assets_defs.ssdf_lighting.datasets import (
+    file_variables,
+    lights_dataset,
+    pca_variables,
+    scene_dataset,
+)
 from pipelines.drawing.stage import Camera
 from pipelines.light.built_in_environments import sky
+from pipelines.ssdf_lighting.compression.clustered_pca import clustered_pca
 from pipelines.ssdf_lighting.compression.compact_file import compress
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.drawing.live_parts import ReferenceView
@@ -65,7 +71,7 @@ def scene(*, textured: bool = False) -> Scene:
 
 def tops(places: np.ndarray) -> np.ndarray:
     """The middles (V, 3) of the halves of the sky that are seen at places (V, 3)."""
-    leaning = places * [2.5, 2.5, 0.0] + [0.0, 0.0, 1.0]
+    leaning = places * [8.0, 8.0, 0.0] + [0.0, 0.0, 1.0]
     return np.asarray(leaning / np.linalg.norm(leaning, axis=1, keepdims=True))
 
 
@@ -75,15 +81,20 @@ def distances(lit_scene: Scene, n: int = 32) -> np.ndarray:
     return np.arcsin(np.clip(height, -1.0, 1.0)).astype(np.float32)
 
 
-def inputs(lit_scene: Scene, n: int = 32) -> Any:
-    """What the package's asset packs."""
-    file = compress(distances(lit_scene, n), lit_scene.triangles, clusters=24, rmse=0.01)
-    counts = {"raw": 0, "file": len(file), "memory": 0}
+def inputs(lit_scene: Scene, n: int = 32, *, paper: bool = False) -> Any:
+    """What the package's asset packs; ``paper``: the distances in the paper's form."""
+    matrix, corners = distances(lit_scene, n), lit_scene.triangles
+    if paper:
+        of_triangle = np.arange(len(corners)) % 5
+        pca = clustered_pca(lambda rows: matrix[rows], corners, of_triangle, values=8)
+        variables = pca_variables(pca)
+    else:
+        variables = file_variables(compress(matrix, corners, clusters=24, rmse=0.01))
     basis = xr.Dataset(
         {
-            "file": (("byte",), np.frombuffer(file, np.uint8)),
-            **{f"bytes_{name}": ((), np.int64(count)) for name, count in counts.items()},
-            "rmse": ((), 0.004),
+            **variables,
+            **{f"bytes_{name}": ((), np.int64(0)) for name in ("raw", "file", "memory")},
+            "rmse": ((), 0.01),
             "wrong_visibility": ((), 0.0),
         }
     )

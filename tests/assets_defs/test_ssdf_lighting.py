@@ -27,7 +27,7 @@ from pipelines.ssdf_lighting.compression.compact_memory import (
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.distances import refined, visibility
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
-from pipelines.ssdf_lighting.drawing import finishes, frames, viewpoints
+from pipelines.ssdf_lighting.drawing import finishes, frames, live_parts, viewpoints
 from pipelines.ssdf_lighting.light import environment_fit
 from pipelines.ssdf_lighting.light.spherical_gaussians import rotated
 from tests.assets_defs.regressions import Regression, assert_check_finds
@@ -317,6 +317,9 @@ REGRESSIONS = (
         "exposed",
         lambda right, radiance, scale: right(radiance, 0.5 * scale),
         KEYS,
+    ),
+    Regression(
+        "mismatches", live_parts, "halfs", lambda right, radiance: right(radiance * 1.001), KEYS
     ),
 )
 

@@ -88,7 +88,7 @@ def test_a_light_of_ones_own(plain: Path, tmp_path: Path, open_viewer: Callable[
         assert time.monotonic() < end
         time.sleep(0.5)
     after = viewer.capture(96, 64).astype(float)
-    assert after[..., 0].mean() / after[..., 2].mean() > 1.5 * (
+    assert after[..., 0].mean() / after[..., 2].mean() > 1.25 * (
         before[..., 0].mean() / before[..., 2].mean()
     )
     assert (
