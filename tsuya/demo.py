@@ -34,4 +34,7 @@ def run_demo(as_json: bool) -> None:
         name(write_overviews(store, slots, folder))
     report(session, launched, paths if as_json else (), as_json)
     if not as_json:
-        click.echo("\nThe pictures are under pictures/. `make ui` opens the graph in a browser.")
+        click.echo(
+            "\nThe pictures are under pictures/. `tsuya view` shows everything live in a browser, "
+            "`make ui` opens the graph."
+        )

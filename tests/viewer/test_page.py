@@ -44,6 +44,7 @@ def test_a_frame_is_the_radiance_encoded_as_srgb(small: Path, open_small: Open) 
     assert viewer.evaluate("() => window.tsuya.firstPicture") > 0
 
 
+@pytest.mark.reads_back("html")
 def test_a_page_opens_from_disk(
     small: Path, content: bytes, tmp_path: Path, open_small: Open
 ) -> None:

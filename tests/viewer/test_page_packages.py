@@ -119,6 +119,7 @@ def test_the_gallery_joins_all_packages(small: Path, tmp_path: Path, open_small:
     assert viewer.evaluate("() => window.tsuya.live") is None
 
 
+@pytest.mark.reads_back("site")
 @pytest.mark.slow
 def test_a_site_is_shown_by_a_host_without_ranges(
     content: bytes, tmp_path: Path, open_small: Open

@@ -37,6 +37,7 @@ def test_arrays_lie_in_little_endian_order(archive: zipfile.ZipFile) -> None:
     ] == expected.reshape(-1).tolist()
 
 
+@pytest.mark.reads_back("tsuya")
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
 def test_pictures_are_pngs_without_profile_or_gamma(
     archive: zipfile.ZipFile, channels: int

