@@ -127,13 +127,12 @@ def street_package(
     tiles = live_tiles(
         street.billboards, street.textures, viewers(drive_frames), settings.tile_metres
     )
-    values, views = _values(drive_frames, depth_maps, tiles), _views(settings, street, drive_frames)
-    values |= {view.picture: frame for view, frame in views}
-    values["poster"] = _poster(settings, street, drive_frames)
+    views = _views(settings, street, drive_frames)
+    values = _values(drive_frames, depth_maps, tiles) | {v.picture: frame for v, frame in views}
     contents = Contents(
         _title(keys),
         _sources(settings, keys),
-        values,
+        values | {"poster": _poster(settings, street, drive_frames)},
         _parameters(drive_frames, billboards, street.textures.colour, tiles),
         [view for view, _ in views],
         _figures(drive_frames, texture_atlases, eigen_textures, street_frames),
