@@ -96,6 +96,7 @@ def inputs(lit_scene: Scene, n: int = 32, *, paper: bool = False) -> Any:
             **{f"bytes_{name}": ((), np.int64(0)) for name in ("raw", "file", "memory")},
             "rmse": ((), 0.01),
             "wrong_visibility": ((), 0.0),
+            "vertex_rmse": (("vertex",), np.zeros(len(matrix), np.float32)),
         }
     )
     cluster = np.arange(len(lit_scene.triangles)) % 3
