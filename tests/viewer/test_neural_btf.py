@@ -62,7 +62,7 @@ def test_what_is_set_changes_the_picture(
     assert np.array_equal(viewer.capture(*SMALL), before)
     changes: list[dict[str, Any]] = [
         {"light": [1.0, -0.3, 0.1]},
-        {"tiles": 1.0},
+        {"tiles": 2.0},
         {"exposure": -1.0},
     ]
     for changed in changes:
