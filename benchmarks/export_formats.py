@@ -25,6 +25,7 @@ class _Counts:
         self.format_of: dict[str, str] = {}
         self.failed: list[str] = []
         self.passed: set[str] = set()
+        self.figures: dict[str, dict[str, float]] = {}
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Note which test reads which format."""
@@ -41,10 +42,14 @@ class _Counts:
             self.failed.append(report.nodeid)
         elif report.when == "call" and report.passed:
             self.passed.add(name)
+            for key, value in report.user_properties:
+                assert isinstance(value, dict)
+                self.figures.setdefault(key, {}).update(value)
 
 
 def format_figures() -> dict[str, Any]:
-    """``formats``, how many were read back; ``mismatches``, tests that found other values."""
+    """``formats``, how many were read back; ``mismatches``, tests that found other values; and the
+    figures that the tests record."""
     done = subprocess.run(
         [sys.executable, "-m", __name__],
         cwd=CHECKOUT,
@@ -63,7 +68,7 @@ def main() -> None:
     pytest.main(["-q", "-n", "0", "-m", "reads_back", "tests"], plugins=[counts])
     read = sorted(counts.passed)
     figures = {"formats": len(read), "formats_read": read, "mismatches": len(counts.failed)}
-    print("\n" + json.dumps(figures | {"mismatching": counts.failed}))
+    print("\n" + json.dumps(figures | {"mismatching": counts.failed} | counts.figures))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,9 @@ def test_values_are_the_decoders(bsdf: Any) -> None:
 
 
 @pytest.mark.reads_back("mitsuba")
-def test_the_cloth_looks_like_the_stages(tmp_path: Path) -> None:
+def test_the_cloth_looks_like_the_stages(
+    tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
     mi, btf, width, tiles = mitsuba(), cloth(), 96, 1.0
     panel = folded_panel(tiles, btf.height / btf.width)
     mesh = Mesh(panel.vertices, panel.triangles, panel.normals, panel.uvs)
@@ -141,5 +144,7 @@ def test_the_cloth_looks_like_the_stages(tmp_path: Path) -> None:
         ).pictures[0]
         return float(10 * np.log10(255**2 / np.mean((shown - own)[inside] ** 2)))
 
+    figures = {"inside the cloth": psnr(0), "inside the cloth, null": psnr(2)}
+    record_property("mitsuba_psnr_db", figures)
     assert psnr(0) >= 35
     assert psnr(2) < 25  # its null: the light a quarter further round
