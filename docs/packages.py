@@ -11,8 +11,8 @@ PAGE = Path(__file__).parent / "packages.md"
 
 _INTRODUCTION = """# Packages, system by system
 
-Made by `make docs` from `storage/packages/`. [How a package is read](package_format.md) comes first:
-the zip, `meta.json`, the kinds of parts, views."""
+Made by `make docs` from `storage/packages/`. [How a package is read](package_format.md) comes
+first: the zip, `meta.json`, the kinds of parts, views."""
 
 
 def package_page(schemas: tuple[PackageSchema, ...]) -> str:
