@@ -44,7 +44,7 @@ class BtfPackageSettings(PackageSettings):
     """The pictures that the package holds."""
 
     view_width: int = Field(160, ge=32, le=1024, description="Of its reference pictures, 4:3")
-    poster_width: int = Field(960, ge=32, le=2048, description="Of its poster, 4:3")
+    poster_width: int = Field(640, ge=32, le=2048, description="Of its poster, 4:3")
     cloth_tiles: float = Field(
         4.0, gt=0.0, le=100.0, description="Tiles over the hanging cloth's width"
     )

@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from assets_defs.glass_scratches.graph import SCRATCHES
-from assets_defs.launcher import Request
 from storage.packages import Package, read_package
 from tests.assets_defs.conftest import house, make_house
+from tests.viewer.made_packages import made_package, mean_difference
 
 __all__ = ["house", "make_house"]
 KEYS = {"setting": "setting-2", "object": "plate"}
@@ -39,21 +39,13 @@ CHANGES: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def package(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built-in package of preset `test`."""
-    house.launcher.launch(Request(SCRATCHES, [KEYS], preset="test"))
-    dataset = house.workspace.store.open(SCRATCHES.slot("glass_package", KEYS))
     path = tmp_path_factory.mktemp("package") / "glass.tsuya"
-    path.write_bytes(dataset["file"].values.tobytes())
-    return path
+    return made_package(house, SCRATCHES, KEYS, path)
 
 
 @pytest.fixture
 def opened(package: Path) -> Package:
     return read_package(package)
-
-
-def _difference(one: Any, other: Any) -> float:
-    """Mean difference in 8-bit codes."""
-    return float(np.abs(one.astype(np.float64) - other).mean())
 
 
 def test_pictures_are_the_stages(
@@ -81,7 +73,7 @@ def test_what_is_set_changes_the_picture(package: Path, open_viewer: Callable[..
     assert np.array_equal(viewer.capture(*SMALL), before)
     for name, value in CHANGES.items():
         viewer.set_view(state=first | {name: value})
-        assert _difference(viewer.capture(*SMALL), before) > 0.3, name
+        assert mean_difference(viewer.capture(*SMALL), before) > 0.3, name
         assert viewer.evaluate("() => window.tsuya.view().state")[name] == value
     viewer.set_view(state=first)
     assert np.array_equal(viewer.capture(*SMALL), before)
@@ -99,7 +91,7 @@ def test_the_lamp_is_dragged_on_the_picture(package: Path, open_viewer: Callable
     after = viewer.evaluate("() => window.tsuya.view().state")["light"]
     assert np.isclose(np.linalg.norm(after), 1.0)
     assert not np.allclose(after, before, atol=0.02)
-    assert _difference(viewer.capture(*SMALL), shown) > 0.3
+    assert mean_difference(viewer.capture(*SMALL), shown) > 0.3
 
 
 def _hdr(path: Path, light: NDArray[np.float32]) -> Path:
@@ -118,7 +110,7 @@ def test_an_environment_of_ones_own(
     drop = "input[name=file]"
     viewer.page.set_input_files(drop, str(_hdr(tmp_path / "same.hdr", 7 * lamps)))
     viewer.wait_for("() => window.tsuya.view().state.environment === 'yours'")
-    assert _difference(viewer.capture(*SMALL), before) < 1.0  # RGBE has 8 bits of each number
+    assert mean_difference(viewer.capture(*SMALL), before) < 1.0  # RGBE has 8 bits of each number
     blue = np.zeros((32, 64, 3), np.uint8)
     blue[..., 0] = 255
     assert cv2.imwrite(str(tmp_path / "blue.png"), blue)
@@ -166,6 +158,6 @@ def test_turning_all_together_changes_nothing(
         camera=camera | {"position": [-y, x, z]},
         state={"swing": 90.0, "turn": state["turn"] + 90.0, "light": [-v, u, w]},
     )
-    assert _difference(viewer.capture(*SMALL), before) < 0.5
+    assert mean_difference(viewer.capture(*SMALL), before) < 0.5
     viewer.set_view(state={"swing": 0.0})
-    assert _difference(viewer.capture(*SMALL), before) > 2.0
+    assert mean_difference(viewer.capture(*SMALL), before) > 2.0

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from assets_defs.launcher import Request
 from assets_defs.neural_btf.graph import BTF
 from storage.packages import read_package
 from tests.assets_defs.conftest import house, make_house
+from tests.viewer.made_packages import made_package, mean_difference
 
 __all__ = ["house", "make_house"]
 WITHOUT = {"material": "knit", "clusters": "none"}
@@ -24,19 +24,11 @@ SMALL = (32, 24)
 @pytest.fixture(scope="module")
 def packages(house: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Built-in packages of preset `test` by their clusters."""
-    house.launcher.launch(Request(BTF, [WITHOUT, CLUSTERED], preset="test"))
     folder = tmp_path_factory.mktemp("packages")
-    paths = {}
-    for keys in (WITHOUT, CLUSTERED):
-        dataset = house.workspace.store.open(BTF.slot("btf_package", keys))
-        paths[keys["clusters"]] = folder / f"cloth-{keys['clusters']}.tsuya"
-        paths[keys["clusters"]].write_bytes(dataset["file"].values.tobytes())
-    return paths
-
-
-def _difference(one: Any, other: Any) -> float:
-    """Mean difference in 8-bit codes."""
-    return float(np.abs(one.astype(np.float64) - other).mean())
+    return {
+        keys["clusters"]: made_package(house, BTF, keys, folder / f"{keys['clusters']}.tsuya")
+        for keys in (WITHOUT, CLUSTERED)
+    }
 
 
 @pytest.mark.parametrize("clusters", ["none", "20"])
@@ -71,7 +63,7 @@ def test_what_is_set_changes_the_picture(
         for name, value in changed.items():
             direction = np.asarray(value) / (np.linalg.norm(value) if name == "light" else 1.0)
             np.testing.assert_allclose(found[name], direction, atol=1e-6)
-        assert _difference(viewer.capture(*SMALL), before) > 1.0, changed
+        assert mean_difference(viewer.capture(*SMALL), before) > 1.0, changed
     viewer.set_view(state=home)
     assert np.array_equal(viewer.capture(*SMALL), before)
 

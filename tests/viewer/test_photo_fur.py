@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Error
 
-from assets_defs.launcher import Request
 from assets_defs.photo_fur.graph import FUR
 from storage.packages import Package, read_package
 from tests.assets_defs.conftest import house, make_house
 from tests.viewer import photo_fur_codes
+from tests.viewer.made_packages import made_package, mean_difference
 
 __all__ = ["house", "make_house"]
 KEYS = {"photo": "chelsea", "mesh": "teapot"}
@@ -27,21 +27,13 @@ SMALL = (64, 48)
 @pytest.fixture(scope="module")
 def package(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A package of preset `test`."""
-    house.launcher.launch(Request(FUR, [KEYS], preset="test"))
-    dataset = house.workspace.store.open(FUR.slot("fur_package", KEYS))
-    path: Path = tmp_path_factory.mktemp("package") / "fur.tsuya"
-    path.write_bytes(dataset["file"].values.tobytes())
-    return path
+    path = tmp_path_factory.mktemp("package") / "fur.tsuya"
+    return made_package(house, FUR, KEYS, path)
 
 
 @pytest.fixture
 def opened(package: Path) -> Package:
     return read_package(package)
-
-
-def _difference(one: Any, other: Any) -> float:
-    """Mean difference in 8-bit codes."""
-    return float(np.abs(one.astype(np.float64) - other).mean())
 
 
 def test_pictures_are_the_stages(
@@ -102,7 +94,7 @@ def test_what_is_set_changes_the_picture(
     before = viewer.capture(*SMALL)
     assert np.array_equal(viewer.capture(*SMALL), before)
     viewer.set_view(state=changed)
-    assert _difference(viewer.capture(*SMALL), before) > 0.3
+    assert mean_difference(viewer.capture(*SMALL), before) > 0.3
     (name,) = changed
     found = viewer.evaluate("() => window.tsuya.view().state")[name]
     same = (

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from assets_defs.launcher import Request
 from assets_defs.street_billboards.graph import STREET
 from storage.packages import Package, read_package
 from tests.assets_defs.conftest import house, make_house
 from tests.pipelines.street_billboards.street_package import street_package
+from tests.viewer.made_packages import made_package
 
 __all__ = ["house", "make_house"]
 LEAST_PSNR = 40.0
@@ -26,12 +26,8 @@ SMALL = (64, 40)
 @pytest.fixture(scope="module")
 def package(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built-in drive's package of preset `test`."""
-    keys = {"drive": "city"}
-    house.launcher.launch(Request(STREET, [keys], preset="test"))
-    dataset = house.workspace.store.open(STREET.slot("street_package", keys))
     path = tmp_path_factory.mktemp("package") / "city.tsuya"
-    path.write_bytes(dataset["file"].values.tobytes())
-    return path
+    return made_package(house, STREET, {"drive": "city"}, path)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "..
 import type { MeshData } from "../package/mesh";
 import type { Package } from "../package/package";
 import { ask } from "./ssdf_lighting/ask";
-import { Backdrop } from "./ssdf_lighting/backdrop";
+import { TurnedEnvironment } from "./ssdf_lighting/turned_environment";
 import { clusterSurface } from "./ssdf_lighting/clusters";
 import type { DistanceTables } from "./ssdf_lighting/distance_tables";
 import { EdgePass } from "./ssdf_lighting/edge_pass";
@@ -100,7 +100,7 @@ class LitView implements LiveView {
   private readonly settings: LitState = { turn: 0, shadows: true, clusters: false, behind: false, exposure: 0 };
   private readonly scene = new THREE.Scene();
   private readonly parts: Surface[];
-  private readonly backdrop = new Backdrop();
+  private readonly backdrop = new TurnedEnvironment();
   private readonly edges: EdgePass;
   private readonly exposure: number;
   private readonly background: Vector;
