@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from pipelines.geometry.solids import Solid
     from pipelines.glass_scratches.drawing.live_parts import ReferenceView
+    from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
     from pipelines.glass_scratches.scratched_glass import ScratchMaterial
     from storage.packages import Contents, Figure, View
 
@@ -55,7 +56,7 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
     import numpy as np
 
     table, along = version.input("scratch_table_2d"), version.input("scratch_table")
-    layers, frames = version.input("scratch_layers"), version.input("glass_frames")
+    layers = version.input("scratch_layers")
     rows = [along["factor"].values[0], along["gamma"].values]
     return {
         "table": table["rho"].values.astype(np.float16),
@@ -63,7 +64,6 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
         "angles": layers["angle"].values,
         "coverage": np.round(255.0 * layers["coverage"].values).astype(np.uint8)[..., None],
         "object": _expected_mesh(version.input("glass_object")),
-        "poster": frames["frames"].values[0],
     }
 
 
@@ -121,7 +121,7 @@ def glass_package(
     )
     views = glass.views(settings.view_size)
     values = glass.parts() | {f"reference_{view.name}": view.frame for view in views}
-    values |= _pictures(scratch_profile, glass_frames)
+    values |= {"poster": glass.poster(), "input": _input(scratch_profile)}
     names = (scratch_profile.attrs["name"], glass_object.attrs["name"], light.source)
     figures = _figures(scratch_table_2d, scratch_table, scratch_layers, glass_frames)
     contents = glass.contents(names, values, views, figures, lineage, settings.licence)
@@ -217,9 +217,19 @@ class _Glass:
     def views(self, size: int) -> tuple[ReferenceView, ...]:
         """The reference views, drawn."""
         from pipelines.glass_scratches.drawing.live_parts import reference_views
+
+        return reference_views(self.solid, self._actor(), self.samplers[self.name], size)
+
+    def poster(self) -> NDArray[np.uint8]:
+        """The glass under a lamp."""
+        from pipelines.glass_scratches.drawing.live_parts import poster
+
+        return poster(self._actor(), self.samplers[self.name])
+
+    def _actor(self) -> ScratchedActor:
         from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
 
-        actor = ScratchedActor(
+        return ScratchedActor(
             self.solid,
             self.material.coverage,
             self.material.layers.angle,
@@ -228,7 +238,6 @@ class _Glass:
             index=self.material.refractive_index,
             tile=self.light.tile,
         )
-        return reference_views(self.solid, actor, self.samplers[self.name], size)
 
     def parameters(self) -> dict[str, Any]:
         """Values by the names of parameters."""
@@ -285,13 +294,10 @@ class _Glass:
         return View(view.name, f"reference_{view.name}", size, size, 2, asdict(view.camera), state)
 
 
-def _pictures(scratch_profile: xr.Dataset, glass_frames: xr.Dataset) -> dict[str, Any]:
+def _input(scratch_profile: xr.Dataset) -> NDArray[np.uint8]:
     from pipelines.glass_scratches.drawing.pictures import profile_picture
 
-    return {
-        "poster": glass_frames["frames"].values[0],
-        "input": profile_picture(scratch_profile["points"].values),
-    }
+    return profile_picture(scratch_profile["points"].values)
 
 
 def _figures(
@@ -307,10 +313,7 @@ def _figures(
     rho = scratch_table_2d["rho"].values
     furnace = table_furnace_error(rho, scratch_table_2d["absorbed"].values)
     middle = float(scratch_table["gamma"].values[len(rho) // 2])
-    index = float(scratch_table["index"])
     return [
-        Figure("Bins of each angle", len(rho), "1", PaperFigure(256, "section 3.1, M")),
-        Figure("Refractive index", index, "1", PaperFigure(1.5, "section 3.1, n")),
         Figure("Gamma, straight on", middle, "1", PaperFigure(8.5476, "by Eq. 2 to 4")),
         Figure("Light that a table of white walls loses", furnace),
         Figure("Coverage of a layer, mean", float(scratch_layers["coverage"].values.mean())),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.stage import Camera
+from pipelines.drawing.stage import Camera, orbit
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing.frames import exposed, object_cameras
 from pipelines.glass_scratches.drawing.stage_view import Lamp, ScratchedActor, draw_scratched
@@ -17,6 +17,9 @@ from pipelines.light.environment_maps import Radiance, check_environment
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 LARGEST_HALF = float(np.finfo(np.float16).max)
+POSTER_SIZE = 480, 640
+"""Height and width."""
+_POSTER_DISTANCE = 3.2
 _LAMP = Lamp((-0.8, 0.48, 0.36), 3.0)
 """Behind the plate and beside the picture, in which a lamp would show only on and in the glass."""
 
@@ -85,3 +88,13 @@ def reference_views(
         )
         for name, camera, lamp in wanted
     )
+
+
+def poster(actor: ScratchedActor, light: EnvironmentSampler) -> NDArray[np.uint8]:
+    """The object from a little above with a lamp that shines on its scratches, 4:3."""
+    height, width = POSTER_SIZE
+    camera = orbit((0.0, 0.0, 0.0), _POSTER_DISTANCE, -68.0, 20.0)
+    drawn = draw_scratched(
+        actor, light, camera, width=width, height=height, supersampling=2, lamp=_LAMP
+    )
+    return exposed(drawn[..., :3], light)
