@@ -1,4 +1,4 @@
-"""Meshes as binary glTF 2.0."""
+"""Binary glTF 2.0: a file of several arrays and pictures, and a mesh as a package has it."""
 
 from __future__ import annotations
 
@@ -10,107 +10,110 @@ from typing import TYPE_CHECKING, Any
 from storage.packages.schema import Mesh
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
 _FLOAT, _UNSIGNED_INT = 5126, 5125
-_VERTEX_DATA, _INDICES = 34962, 34963
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 Z_UP_TO_Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """A quarter turn about x, as a quaternion (x, y, z, w)."""
 
 
-def glb_bytes(mesh: Mesh, material: dict[str, Any] | None = None) -> bytes:
+class GlbFile:
+    """The buffer of a .glb, its views and accessors."""
+
+    def __init__(self) -> None:
+        self._content = bytearray()
+        self._views: list[dict[str, int]] = []
+        self._accessors: list[dict[str, Any]] = []
+
+    def values(self, array: NDArray[Any]) -> int:
+        """The number of an accessor of floats (N,) or (N, k), with their bounds."""
+        import numpy as np
+
+        stored = np.ascontiguousarray(array, "<f4")
+        rows = stored.reshape(len(stored), -1)
+        return self._accessor(
+            {
+                "bufferView": self._view(stored.tobytes()),
+                "componentType": _FLOAT,
+                "count": len(rows),
+                "type": _TYPES[rows.shape[1]],
+                "min": rows.min(axis=0).tolist(),
+                "max": rows.max(axis=0).tolist(),
+            }
+        )
+
+    def indices(self, corners: NDArray[np.integer]) -> int:
+        """The number of an accessor of vertex numbers."""
+        stored = corners.reshape(-1).astype("<u4")
+        made = {"bufferView": self._view(stored.tobytes()), "componentType": _UNSIGNED_INT}
+        return self._accessor(made | {"count": len(stored), "type": "SCALAR"})
+
+    def picture(self, codes: NDArray[np.uint8]) -> int:
+        """The number of a view that holds a picture as PNG."""
+        import imagecodecs
+
+        return self._view(bytes(imagecodecs.png_encode(codes)))
+
+    def whole(self, document: dict[str, Any]) -> bytes:
+        """The file: glTF's JSON, without what is of the buffer, and the buffer."""
+        parts: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "Tsuya"},
+            "buffers": [{"byteLength": len(self._content)}],
+            "bufferViews": self._views,
+            "accessors": self._accessors,
+        }
+        text = json.dumps(parts | document, separators=(",", ":"), sort_keys=True).encode()
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + len(self._content)
+        return b"".join(
+            (
+                struct.pack("<4sII", b"glTF", 2, total),
+                struct.pack("<I4s", len(text), b"JSON"),
+                text,
+                struct.pack("<I4s", len(self._content), b"BIN\0"),
+                self._content,
+            )
+        )
+
+    def _view(self, content: bytes) -> int:
+        self._views.append(
+            {"buffer": 0, "byteOffset": len(self._content), "byteLength": len(content)}
+        )
+        self._content += content + b"\0" * (-len(content) % 4)
+        return len(self._views) - 1
+
+    def _accessor(self, made: dict[str, Any]) -> int:
+        self._accessors.append(made)
+        return len(self._accessors) - 1
+
+
+def glb_bytes(mesh: Mesh) -> bytes:
     """A mesh as a .glb: one scene, one node, one primitive.
 
     The arrays are written as they are, z up, v from the bottom turned to v from the top; the node
-    turns them to glTF's y up. ``material`` is glTF's JSON of a material. Raises ValueError for a
-    mesh without triangles.
+    turns them to glTF's y up. Raises ValueError for a mesh without triangles.
     """
     import numpy as np
 
     if not len(mesh.triangles):
         raise ValueError("mesh has no triangles; expected one or more.")
-    buffers = _Buffers()
-    attributes = {"POSITION": buffers.add(mesh.vertices, bounds=True)}
+    file = GlbFile()
+    attributes = {"POSITION": file.values(mesh.vertices)}
     if mesh.normals is not None:
-        attributes["NORMAL"] = buffers.add(mesh.normals)
+        attributes["NORMAL"] = file.values(mesh.normals)
     if mesh.uvs is not None:
         flipped = np.stack([mesh.uvs[:, 0], 1 - mesh.uvs[:, 1]], axis=1)
-        attributes["TEXCOORD_0"] = buffers.add(flipped)
+        attributes["TEXCOORD_0"] = file.values(flipped)
     for name, values in mesh.attributes.items():
-        attributes[f"_{name}"] = buffers.add(values)
-    primitive: dict[str, Any] = {
-        "attributes": attributes,
-        "indices": buffers.add(mesh.triangles.reshape(-1), indices=True),
-    }
-    document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "Tsuya"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],
-        "meshes": [{"primitives": [primitive]}],
-    }
-    if material is not None:
-        primitive["material"] = 0
-        document["materials"] = [material]
-    return container(document | buffers.document(), bytes(buffers.content))
-
-
-def container(document: dict[str, Any], content: bytes) -> bytes:
-    """glTF's JSON and its binary chunk as one .glb."""
-    text = json.dumps(document, separators=(",", ":"), sort_keys=True).encode()
-    text += b" " * (-len(text) % 4)
-    content += b"\0" * (-len(content) % 4)
-    total = 12 + 8 + len(text) + 8 + len(content)
-    return b"".join(
-        (
-            struct.pack("<4sII", b"glTF", 2, total),
-            struct.pack("<I4s", len(text), b"JSON"),
-            text,
-            struct.pack("<I4s", len(content), b"BIN\0"),
-            content,
-        )
+        attributes[f"_{name}"] = file.values(values)
+    primitive = {"attributes": attributes, "indices": file.indices(mesh.triangles)}
+    return file.whole(
+        {
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],
+            "meshes": [{"primitives": [primitive]}],
+        }
     )
-
-
-class _Buffers:
-    """Arrays one after the other in one buffer."""
-
-    def __init__(self) -> None:
-        self.content = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, array: NDArray[Any], *, indices: bool = False, bounds: bool = False) -> int:
-        """The number of the accessor of an array, which becomes float32, or uint32 if indices."""
-        import numpy as np
-
-        stored = np.ascontiguousarray(array, "<u4" if indices else "<f4")
-        width = stored.shape[1] if stored.ndim == 2 else 1
-        accessor: dict[str, Any] = {
-            "bufferView": len(self.views),
-            "componentType": _UNSIGNED_INT if indices else _FLOAT,
-            "count": len(stored),
-            "type": _TYPES[width],
-        }
-        if bounds:
-            accessor |= {"min": stored.min(axis=0).tolist(), "max": stored.max(axis=0).tolist()}
-        self.views.append(
-            {
-                "buffer": 0,
-                "byteOffset": len(self.content),
-                "byteLength": stored.nbytes,
-                "target": _INDICES if indices else _VERTEX_DATA,
-            }
-        )
-        self.content += stored.tobytes()
-        self.accessors.append(accessor)
-        return len(self.accessors) - 1
-
-    def document(self) -> dict[str, Any]:
-        """Their part of glTF's JSON."""
-        return {
-            "buffers": [{"byteLength": len(self.content)}],
-            "bufferViews": self.views,
-            "accessors": self.accessors,
-        }

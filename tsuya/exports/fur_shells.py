@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from storage.packages import Mesh, Package
+from storage.packages.glb import Z_UP_TO_Y_UP, GlbFile, glb_bytes
 from tsuya.exports.format import Format, Notes
-from tsuya.exports.glb_file import GlbFile
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,7 +30,6 @@ def write_glb(package: Package, target: Path) -> Notes:
     import numpy as np
 
     from pipelines.photo_fur.shells import shell_vertices
-    from storage.packages.glb import Z_UP_TO_Y_UP
 
     layers, mesh, glb = package.parameter("layers"), package.mesh("mesh"), GlbFile()
     assert mesh.normals is not None
@@ -51,7 +50,6 @@ def write_glb(package: Package, target: Path) -> Notes:
     ]
     numbers = range(1, layers + 1)
     document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "Tsuya"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],
@@ -115,7 +113,6 @@ def write_three(package: Package, target: Path) -> Notes:
     Raises BadInput for a package that is damaged.
     """
     from pipelines.photo_fur.live_parts import shell_sources
-    from storage.packages.glb import glb_bytes
 
     mesh = package.mesh("mesh")
     surface = Mesh(mesh.vertices, mesh.triangles, mesh.normals, mesh.uvs)

@@ -6,8 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from storage.packages import Package
-from storage.packages.glb import Z_UP_TO_Y_UP
-from tsuya.exports.glb_file import GlbFile
+from storage.packages.glb import Z_UP_TO_Y_UP, GlbFile
 
 if TYPE_CHECKING:
     import numpy as np
@@ -114,7 +113,6 @@ def scene_glb(package: Package, sky: NDArray[np.float32]) -> bytes:
         )
     pictures = map_files(package)
     document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "Tsuya"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],

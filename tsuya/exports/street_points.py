@@ -138,44 +138,21 @@ def _point_glb(
     attributes: Mapping[str, NDArray[Any]], extensions: Mapping[str, Any] | None = None
 ) -> bytes:
     """Points of these attributes, all float32, z up under a node that turns z to y."""
-    import numpy as np
+    from storage.packages.glb import Z_UP_TO_Y_UP, GlbFile
 
-    from storage.packages.glb import Z_UP_TO_Y_UP, container
-
-    kinds = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-    content, views, accessors = b"", list[dict[str, Any]](), list[dict[str, Any]]()
-    for name, values in attributes.items():
-        stored = np.ascontiguousarray(values, "<f4")
-        accessor: dict[str, Any] = {
-            "bufferView": len(views),
-            "componentType": 5126,
-            "count": len(stored),
-            "type": kinds[stored.shape[1] if stored.ndim == 2 else 1],
-        }
-        if name == "POSITION":
-            accessor |= {"min": stored.min(axis=0).tolist(), "max": stored.max(axis=0).tolist()}
-        views.append({"buffer": 0, "byteOffset": len(content), "byteLength": stored.nbytes})
-        views[-1]["target"] = 34962
-        accessors.append(accessor)
-        content += stored.tobytes()
-    primitive: dict[str, Any] = {
-        "mode": 0,
-        "attributes": {name: number for number, name in enumerate(attributes)},
-    }
+    file = GlbFile()
+    named = {name: file.values(values) for name, values in attributes.items()}
+    primitive: dict[str, Any] = {"mode": 0, "attributes": named}
     document: dict[str, Any] = {
-        "asset": {"version": "2.0", "generator": "Tsuya"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],
         "meshes": [{"primitives": [primitive]}],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(content)}],
     }
     if extensions:
         primitive["extensions"] = dict(extensions)
         document["extensionsUsed"] = sorted(extensions)
-    return container(document, content)
+    return file.whole(document)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -131,7 +131,7 @@ def cloth_glb(maps: SvbrdfMaps, cloth: Mesh, tiles: float, title: str) -> bytes:
     """A cloth with the material, ``tiles`` repeats over a unit of its texture coordinates."""
     import numpy as np
 
-    from tsuya.exports.glb_file import GlbFile
+    from storage.packages.glb import GlbFile
 
     assert cloth.normals is not None
     assert cloth.uvs is not None
@@ -152,7 +152,6 @@ def cloth_glb(maps: SvbrdfMaps, cloth: Mesh, tiles: float, title: str) -> bytes:
     pictures = (maps.base_colour, maps.surface, maps.normal)
     images = [{"mimeType": "image/png", "bufferView": file.picture(each)} for each in pictures]
     document = {
-        "asset": {"version": "2.0", "generator": "Tsuya"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "name": title, "rotation": list(Z_UP_TO_Y_UP)}],
