@@ -53,6 +53,7 @@ docs: setup      ## docs/assets.md from the schemas; docs/inputs.md, docs/packag
 	@$(VENV)/python -m docs.packages
 	@$(VENV)/python -m docs.pictures
 	@$(VENV)/python -m docs.textured_scene
+	@$(VENV)/python -m docs.viewer_pictures
 
 doctor: setup    ## check this machine and draw one picture
 	@$(VENV)/tsuya doctor
