@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import hypothesis
 import pytest
 
 from storage.schemas import systems
+
+# How long an example takes says something of the machine and of what is compiled, not of the code.
+hypothesis.settings.register_profile("tests", deadline=None)
+hypothesis.settings.load_profile("tests")
 
 _INSTRUMENTS = {
     "virtual/cloth": "neural_btf",
@@ -23,3 +32,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         place = path + item.name  # a case may name its system, too
         name = next((owner for part, owner in owners.items() if part in place), path)
         item.add_marker(pytest.mark.xdist_group(name))
+
+
+# ---- a browser -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def built_viewer() -> Path:
+    """The folder of the built page, made again where a source is newer."""
+    from benchmarks.viewer_page import build_viewer
+
+    return build_viewer()
+
+
+@pytest.fixture(scope="module")
+def chromium(built_viewer: Path) -> Iterator[Any]:
+    """Playwright's headless Chromium; for a module, as other tests want loops of their own."""
+    from benchmarks.viewer_page import chromium_browser
+
+    try:
+        with chromium_browser() as browser:
+            yield browser
+    except FileNotFoundError as missing:
+        pytest.skip(str(missing))

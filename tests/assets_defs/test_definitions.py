@@ -81,6 +81,7 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "compressed_btf": {"abrdf_matrix", "abrdf_clusters", "neural_btf"},
         "restored_images": {"btf_images", "abrdf_matrix", "compressed_btf"},
         "cloth_frames": {"compressed_btf"},
+        "btf_package": {"compressed_btf", "restored_images"},
     }
     assert _parents(house, SCRATCHES) == {
         "scratch_profile": set(),
@@ -89,6 +90,7 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "scratch_layers": set(),
         "glass_object": set(),
         "glass_frames": {"scratch_table_2d", "scratch_table", "scratch_layers", "glass_object"},
+        "glass_package": set(SCRATCHES.plans) - {"glass_package"},
     }
     assert _parents(house, SSDF) == {
         "scene_mesh": set(),
@@ -103,6 +105,13 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
             "triangle_clusters",
             "ssdf_basis",
             "environment_lights",
+        },
+        "lit_package": {
+            "scene_mesh",
+            "triangle_clusters",
+            "ssdf_basis",
+            "environment_lights",
+            "relit_frames",
         },
     }
     assert _parents(house, STREET) == {
@@ -119,6 +128,14 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
             "billboards",
             "eigen_textures",
             "texture_atlases",
+        },
+        "street_package": {
+            "drive_frames",
+            "depth_maps",
+            "billboards",
+            "eigen_textures",
+            "texture_atlases",
+            "street_frames",
         },
     }
     for system in SYSTEMS.values():

@@ -8,6 +8,8 @@ import importlib
 from benchmarks.structure import modules
 
 PACKAGES = ("pipelines", "storage", "tsuya")
+PLUG_INS = "tsuya.exports.mitsuba.tsuya_"
+"""How modules begin that Mitsuba imports once it has a variant."""
 
 
 def found_examples() -> list[doctest.DocTest]:
@@ -15,7 +17,9 @@ def found_examples() -> list[doctest.DocTest]:
     finder = doctest.DocTestFinder(exclude_empty=True)
     found = []
     for name in modules():
-        if name.partition(".")[0] in PACKAGES and not name.endswith("__main__"):
+        if name.endswith("__main__") or name.startswith(PLUG_INS):
+            continue
+        if name.partition(".")[0] in PACKAGES:
             found += finder.find(importlib.import_module(name))
     return [test for test in found if any(_is_run(example) for example in test.examples)]
 

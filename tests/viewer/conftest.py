@@ -16,30 +16,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from benchmarks.viewer_page import (
-    ViewerPage,
-    build_viewer,
-    chromium_browser,
-    served_packages,
-)
+from benchmarks.viewer_page import ViewerPage, served_packages
 from storage.packages.conformance import SMALL, small_contents
 from storage.packages.writing import Figure, PaperFigure, write_package
-
-
-@pytest.fixture(scope="session")
-def built_viewer() -> Path:
-    """The folder of the built page, made again where a source is newer."""
-    return build_viewer()
-
-
-@pytest.fixture(scope="session")
-def chromium(built_viewer: Path) -> Iterator[Any]:
-    """Playwright's headless Chromium."""
-    try:
-        with chromium_browser() as browser:
-            yield browser
-    except FileNotFoundError as missing:
-        pytest.skip(str(missing))
 
 
 @pytest.fixture

@@ -14,10 +14,8 @@ import pytest
 from assets_defs.workspace import CHECKOUT
 from storage.packages import Package
 from tests.fur_packages import fur_package, tufts
-from tests.viewer.conftest import built_viewer, chromium
 from tsuya.exports import find_format
 
-__all__ = ["built_viewer", "chromium"]
 LAYERS = 6
 THREE = CHECKOUT / "viewer" / "node_modules" / "three"
 _FILLS = ("columns", "bands")
