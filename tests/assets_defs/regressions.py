@@ -105,7 +105,9 @@ def assert_check_finds(
     done = materialise(house, system, plan.name, regression.keys)
     monkeypatch.undo()
     assert not done.success
-    (rejected,) = set(store.versions(slot)) - versions
+    made = set(store.versions(slot)) - versions
+    assert len(made) == 1, [event.message for event in done.all_events if event.is_failure]
+    (rejected,) = made
     verdict = store.verdicts(slot, rejected)[regression.check]
     assert not verdict["passed"]
     assert regression.check in verdict["reason"]
