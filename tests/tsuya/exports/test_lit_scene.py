@@ -42,6 +42,7 @@ def _faces(vertices: Any, faces: Any) -> Any:
     return corners[np.lexsort(corners.T)]
 
 
+@pytest.mark.reads_back("glb")
 def test_trimesh_reads_the_scene_as_it_is(package: Package, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     folder = _written(package, "glb", tmp_path)
@@ -117,6 +118,7 @@ def test_the_papers_form_is_decoded_too() -> None:
     assert np.abs(found[1:] - expected[:-1]).max() > 0.1
 
 
+@pytest.mark.reads_back("usd")
 def test_usd_is_read_by_openusd(package: Package, tmp_path: Path) -> None:
     pxr = pytest.importorskip("pxr")
     from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade

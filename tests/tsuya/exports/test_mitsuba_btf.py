@@ -126,6 +126,7 @@ def test_the_cloth_looks_like_the_stages(
     tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     mi, btf, width, tiles = mitsuba(), cloth(), 96, 1.0
+    importlib.import_module("tsuya.exports.mitsuba.tsuya_btf")
     panel = folded_panel(tiles, btf.height / btf.width)
     mesh = Mesh(panel.vertices, panel.triangles, panel.normals, panel.uvs)
     camera = orbit((0.0, 0.0, 0.0), 3.6, -90.0, 62.0, view_angle=24.0)
