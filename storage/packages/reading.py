@@ -208,7 +208,7 @@ def read_package(source: bytes | str | PathLike[str], name: str = "package") -> 
         check_file(source, "a .tsuya package", largest=None)
     try:
         archive = zipfile.ZipFile(io.BytesIO(source) if isinstance(source, bytes) else source)
-    except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
+    except (zipfile.BadZipFile, ValueError, RuntimeError, OSError):
         raise BadInput(name, "file", "no whole zip", "a .tsuya package, complete") from None
     meta = _meta(archive, name)
     _check_files(archive, meta, name)
