@@ -5,6 +5,9 @@ import type { Bounds } from "../live_view";
 
 export type Vector = [number, number, number];
 
+/** In distances to its target: how far an orthographic camera is away. */
+const FAR_AWAY = 1e4;
+
 /** Where the picture is taken from; scene units, degrees. Plain JSON. */
 export interface Camera {
   position: Vector;
@@ -38,6 +41,14 @@ export function drawingCamera(camera: Camera, width: number, height: number, bou
   if (camera.shift) made.setViewOffset(width, height, -camera.shift[0], -camera.shift[1], width, height);
   made.updateProjectionMatrix();
   return made;
+}
+
+/** Where the eye is; that of an orthographic camera as far away as the stage has it. */
+export function eyeOf({ position, target, height }: Camera): Vector3 {
+  const eye = new Vector3(...position);
+  if (height === null) return eye;
+  const middle = new Vector3(...target);
+  return eye.sub(middle).multiplyScalar(FAR_AWAY).add(middle);
 }
 
 /** World to device coordinates. */

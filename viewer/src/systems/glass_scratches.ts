@@ -1,7 +1,7 @@
 /** Scratched glass in its environment, tilted under a lamp. */
 
 import * as THREE from "three";
-import { orbit, type Camera } from "../drawing/camera";
+import { eyeOf, orbit, type Camera } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
 import { Environment, lampRadiance, lampSteradians } from "./glass_scratches/environment";
@@ -13,8 +13,6 @@ import { Surroundings } from "./glass_scratches/surroundings";
 
 /** The name of a person's own environment. */
 const DROPPED = "yours";
-/** An orthographic camera is as far away as the stage's, in distances to its target. */
-const FAR_AWAY = 1e4;
 /** A dark set: the lamps' room is dimmed, one of them stands behind the glass, the lamp beside it. */
 const DARK_SET = { turn: -84, brightness: 0.18, tilt: 14, lamp: 7 };
 const BRIGHT_SET = { turn: 0, brightness: 1, tilt: 0, lamp: 2 };
@@ -131,13 +129,6 @@ class ScratchedGlass implements LiveView {
 
 function matrix(turn: THREE.Quaternion): THREE.Matrix3 {
   return new THREE.Matrix3().setFromMatrix4(new THREE.Matrix4().makeRotationFromQuaternion(turn));
-}
-
-function eyeOf(camera: Camera): THREE.Vector3 {
-  const position = new THREE.Vector3(...camera.position);
-  if (camera.height === null) return position;
-  const target = new THREE.Vector3(...camera.target);
-  return position.sub(target).multiplyScalar(FAR_AWAY).add(target);
 }
 
 /** The system's live view. */

@@ -1,7 +1,7 @@
 /** A hanging cloth of a neural BTF, decoded at each pixel, under a light that is dragged. */
 
 import * as THREE from "three";
-import type { Camera } from "../drawing/camera";
+import { eyeOf, type Camera } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import { Surface } from "../drawing/surface";
 import { texture } from "../drawing/textures";
@@ -9,9 +9,6 @@ import type { Bounds, LiveView, State, SystemViewer } from "../live_view";
 import type { Package } from "../package/package";
 import { LAYERS, latentTexels, upsideDown, weightTexels, type Layer } from "./neural_btf/decoder_texels";
 import { CONTROLS, withState, type Settings } from "./neural_btf/state";
-
-/** An orthographic camera is as far away as the stage's, in distances to its target. */
-const FAR_AWAY = 1e4;
 
 /** What a package says of itself, for the drawer. */
 interface Material {
@@ -67,13 +64,6 @@ class HangingCloth implements LiveView {
     this.cloth.dispose();
     this.around.dispose();
   }
-}
-
-function eyeOf(camera: Camera): THREE.Vector3 {
-  const position = new THREE.Vector3(...camera.position);
-  if (camera.height === null) return position;
-  const target = new THREE.Vector3(...camera.target);
-  return position.sub(target).multiplyScalar(FAR_AWAY).add(target);
 }
 
 async function clothOf(pkg: Package, [columns, rows]: [number, number], latents: Float32Array): Promise<Surface> {
