@@ -51,9 +51,16 @@ def test_the_files_that_are_made_wrong_were_right(tmp_path: Path, case: Case) ->
     READERS[case.reader](written(case, tmp_path / "in"))
 
 
-def test_equal_seeds_make_equal_files_and_others_do_not() -> None:
+def test_equal_seeds_make_equal_files_and_others_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the time: zips and colour profiles hold one unless they are told not to."""
     valid = valid_cases()
-    inputs = [[case_of(row, seed, [], valid) for row in range(300)] for seed in (1, 1, 2)]
+    inputs = [[case_of(row, 1, [], valid) for row in range(300)]]
+    with monkeypatch.context() as later:
+        for clock in ("localtime", "gmtime"):
+            at = getattr(time, clock)
+            later.setattr(time, clock, lambda *_, at=at: at(2_000_000_000))
+        inputs += [[case_of(row, seed, [], valid) for row in range(300)] for seed in (1, 2)]
+    assert [case.files for case in valid_cases()] == [case.files for case in valid]
     assert inputs[0] == inputs[1]
     same = [one == other for one, other in zip(inputs[0], inputs[2], strict=True)]
     assert sum(same) < 30
