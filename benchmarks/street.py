@@ -32,6 +32,13 @@ from assets_defs.workspace import CHECKOUT, Workspace
 from benchmarks.street_codecs import blocks_coded
 from benchmarks.street_drive import KEYS, launch
 from benchmarks.street_points import drawn_points
+from pipelines.drawing.picture_metrics import (
+    ImageMetrics,
+    image_metrics,
+    psnr,
+    psnr_of_squared_errors,
+    squared_errors,
+)
 from pipelines.drawing.stage import Stage
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES, Billboards
@@ -163,7 +170,7 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
     for name in ("bc1", "bc7"):
         pictures, size = blocks_coded(name, views.colours, seen)
         apart = pictures[seen].astype(np.float64) - views.colours[seen]
-        rivals[name] = (figures.psnr_of_squared_errors(apart**2), size)
+        rivals[name] = (psnr_of_squared_errors(apart**2), size)
     curve = []
     for error in (3.0, 4.4, 5.0):
         ours = coding.compress_views(views, turns, error=error)
@@ -200,18 +207,16 @@ def _blocks(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
 
 def _judged(
     pictures: NDArray[np.uint8], truths: NDArray[np.uint8], where: NDArray[np.bool_]
-) -> list[figures.ImageMetrics]:
+) -> list[ImageMetrics]:
     evened = [figures.match_exposure(*one) for one in zip(pictures, truths, where, strict=True)]
-    return [figures.image_metrics(*one) for one in zip(evened, truths, where, strict=True)]
+    return [image_metrics(*one) for one in zip(evened, truths, where, strict=True)]
 
 
 def _pole_squares(stored: Stored) -> list[NDArray[np.float64]]:
     """Squared errors near the poles' true silhouettes, frame by frame."""
     shown, drive = stored("street_frames"), stored("drive_frames")
     return [
-        figures.squared_errors(
-            picture, truth, figures.dilated(pole, POLE_PIXELS) & np.isfinite(depth)
-        )
+        squared_errors(picture, truth, figures.dilated(pole, POLE_PIXELS) & np.isfinite(depth))
         for picture, truth, pole, depth in zip(
             shown["rendered"].values,
             shown["truth"].values,
@@ -246,7 +251,7 @@ def _held_out(stored: Stored, found: dict[str, Any]) -> dict[str, Any]:
     )
     both = covered & drawn.covered
     rendered = shown["rendered"].values
-    ours = [figures.psnr(*one) for one in zip(rendered, truth, both, strict=True)]
+    ours = [psnr(*one) for one in zip(rendered, truth, both, strict=True)]
     theirs = [one.psnr for one in _judged(drawn.pictures, truth, both)]
     return {
         "held_out_psnr": float(shown["psnr"].mean()),
@@ -272,13 +277,13 @@ def _plain(folder: Path, stored: Stored, found: dict[str, Any]) -> dict[str, Any
     aware, plain = found["_pole"], _pole_squares(stored)
     plain_frames = stored("street_frames")
     gains = [
-        figures.psnr_of_squared_errors(mine) - figures.psnr_of_squared_errors(theirs)
+        psnr_of_squared_errors(mine) - psnr_of_squared_errors(theirs)
         for mine, theirs in zip(aware, plain, strict=True)
         if len(mine)
     ]
     return {
-        "occlusion_gain_db": figures.psnr_of_squared_errors(np.concatenate(aware))
-        - figures.psnr_of_squared_errors(np.concatenate(plain)),
+        "occlusion_gain_db": psnr_of_squared_errors(np.concatenate(aware))
+        - psnr_of_squared_errors(np.concatenate(plain)),
         "occlusion_gain_db_by_frame": gains,
         "plain_held_out_psnr": float(plain_frames["psnr"].mean()),
         "plain_held_out_psnr_whole_frame": figures.mean_psnr(

@@ -6,16 +6,12 @@ the points, of pictures against photographs. Textures have theirs in `textures.f
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
+from pipelines.drawing.picture_metrics import Picture, psnr
 from pipelines.geometry.cameras import project_points
-
-Picture = NDArray[np.uint8]
 
 RAW_BYTES = 98_304
 """Of a billboard: 32 views of 32 x 32 pixels of 3 bytes."""
@@ -23,16 +19,6 @@ _FARTHEST = 20.0
 """Metres, up to which depth is judged."""
 _TOLERANCE = 0.05
 """Of a depth: what is off by less is right."""
-
-
-class ImageMetrics(NamedTuple):
-    """How a picture differs from the true one, over some of their pixels."""
-
-    psnr: float
-    """dB, of 8-bit codes."""
-    ssim: float
-    flip: float
-    """Mean of the FLIP map, 0 = alike."""
 
 
 # ---- drives ----------------------------------------------------------------------------------
@@ -193,43 +179,9 @@ def match_exposure(picture: Picture, truth: Picture, where: NDArray[np.bool_]) -
     return np.rint(encode_srgb(linear) * 255.0).astype(np.uint8)
 
 
-def image_metrics(picture: Picture, truth: Picture, where: NDArray[np.bool_]) -> ImageMetrics:
-    """Compare 8-bit sRGB pictures (y, x, 3) over the pixels ``where`` (y, x)."""
-    from flip_evaluator import evaluate
-    from skimage.metrics import structural_similarity
-
-    _, ssim = structural_similarity(picture, truth, channel_axis=2, full=True)
-    flip, _, _ = evaluate(
-        (truth / 255.0).astype(np.float32),
-        (picture / 255.0).astype(np.float32),
-        "LDR",
-        applyMagma=False,
-    )
-    return ImageMetrics(
-        psnr(picture, truth, where), float(ssim[where].mean()), float(flip[..., 0][where].mean())
-    )
-
-
-def psnr(picture: Picture, truth: Picture, where: NDArray[np.bool_]) -> float:
-    """PSNR of 8-bit codes over the pixels ``where``, dB."""
-    return psnr_of_squared_errors(squared_errors(picture, truth, where))
-
-
 def mean_psnr(pictures: Picture, truths: Picture, where: NDArray[np.bool_]) -> float:
     """Mean of the PSNRs of pictures (k, y, x, 3) over their pixels ``where`` (k, y, x), dB."""
     return float(np.mean([psnr(*one) for one in zip(pictures, truths, where, strict=True)]))
-
-
-def squared_errors(
-    picture: Picture, truth: Picture, where: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Squared differences of codes (n, 3) over the pixels ``where``; they may be pooled."""
-    return (picture[where].astype(np.float64) - truth[where]) ** 2
-
-
-def psnr_of_squared_errors(squared: NDArray[np.float64]) -> float:
-    """PSNR of squared differences of 8-bit codes, dB."""
-    return 10.0 * math.log10(255.0**2 / max(float(squared.mean()), 1e-12))
 
 
 def differing_share(picture: Picture, other: Picture, most: int = 1) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.picture_metrics import ImageMetrics, image_metrics
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.drawing.street_stage import (
@@ -16,7 +17,6 @@ from pipelines.street_billboards.drawing.street_stage import (
     flight_poses,
     shader_and_processor_pictures,
 )
-from pipelines.street_billboards.figures import ImageMetrics
 from pipelines.street_billboards.street_model import StreetModel
 
 FloatArray = NDArray[np.float64]
@@ -154,7 +154,7 @@ def draw_frames(
         flight=shown[flying:],
         shaded=shaded,
         decoded=decoded,
-        metrics=[figures.image_metrics(*one) for one in judged],
+        metrics=[image_metrics(*one) for one in judged],
         visible_billboards=drawn[0].billboards,
         renderer=stage.renderer_name,
     )

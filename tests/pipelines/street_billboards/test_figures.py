@@ -19,17 +19,13 @@ from pipelines.street_billboards.figures import (
     excess_rank,
     exposure_spread,
     frame_spacing,
-    image_metrics,
     largest_log_gain,
     match_exposure,
     mean_psnr,
     neighbour_difference,
     off_plane,
     path_length,
-    psnr,
-    psnr_of_squared_errors,
     share_in_voxels,
-    squared_errors,
     stray_share,
 )
 from tests.pipelines.street_billboards.compressed_street import placed_camera
@@ -42,49 +38,6 @@ def noise(seed: int = 0) -> np.ndarray:
 
 
 # ---- pictures --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("off", [1, 7, 20])
-def test_psnr_of_an_even_difference(off: int) -> None:
-    truth = noise()
-    picture = truth + np.uint8(off)
-    assert psnr(picture, truth, ALL) == pytest.approx(20 * math.log10(255 / off))
-    assert psnr(truth, picture, ALL) == pytest.approx(20 * math.log10(255 / off))
-
-
-def test_psnr_asks_only_where_it_is_told() -> None:
-    truth = noise()
-    where = np.random.default_rng(1).random(ALL.shape) < 0.5
-    picture = np.where(where[..., None], truth + np.uint8(10), 0).astype(np.uint8)
-    assert psnr(picture, truth, where) == pytest.approx(20 * math.log10(25.5))
-
-
-def test_squares_may_be_pooled() -> None:
-    truth, picture = noise(1), noise(2)
-    left = ALL.copy()
-    left[:, 11:] = False
-    parts = [squared_errors(picture, truth, left), squared_errors(picture, truth, ~left)]
-    assert psnr_of_squared_errors(np.concatenate(parts)) == pytest.approx(psnr(picture, truth, ALL))
-
-
-def test_equal_pictures_are_alike() -> None:
-    found = image_metrics(noise(), noise(), ALL)
-    assert found.psnr > 100
-    assert found.ssim == pytest.approx(1.0)
-    assert found.flip == pytest.approx(0.0, abs=1e-6)
-
-
-def test_image_metrics_see_only_the_asked_half() -> None:
-    truth = noise()
-    picture = truth.copy()
-    picture[:, :8] = 255 - picture[:, :8]
-    right = ALL.copy()
-    right[:, :23] = False  # FLIP's and SSIM's windows are smaller than the gap
-    spoilt = image_metrics(picture, truth, ~right)
-    assert image_metrics(picture, truth, right).ssim == pytest.approx(1.0)
-    assert image_metrics(picture, truth, right).psnr > 100
-    assert spoilt.ssim < 0.9
-    assert spoilt.flip > 0.05
 
 
 @given(gains=st.tuples(*[st.floats(0.3, 1.0)] * 3), seed=st.integers(0, 100))

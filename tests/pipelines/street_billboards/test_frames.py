@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.picture_metrics import image_metrics
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards.drawing.street_stage import StreetStage, flight_poses
-from pipelines.street_billboards.figures import image_metrics, match_exposure
+from pipelines.street_billboards.figures import match_exposure
 from pipelines.street_billboards.frames import (
     StreetFrames,
     Viewpoints,

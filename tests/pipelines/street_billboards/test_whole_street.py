@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.drawing.picture_metrics import psnr
 from pipelines.street_billboards.capture.drive_depth import RigFrame
-from pipelines.street_billboards.figures import match_exposure, psnr
+from pipelines.street_billboards.figures import match_exposure
 from pipelines.street_billboards.frames import draw_view
 from pipelines.street_billboards.whole_street import street_of_frames
 from tests.pipelines.street_billboards.stereo_street import frame_at
