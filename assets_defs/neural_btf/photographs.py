@@ -66,7 +66,7 @@ class ImageSettings(Settings):
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"texels": 12, "directions": 15, "samples": 1},
-        "paper": {"texels": 100, "directions": 81, "samples": 4},
+        "paper": {"texels": 100, "directions": 81, "samples": 16},
     }
 
 

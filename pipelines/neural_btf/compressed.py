@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,7 @@ from pipelines.neural_btf.decoder_arrays import (
     direction_inputs,
     direction_inputs_of_vectors,
 )
+from pipelines.neural_btf.latent_texture import between_levels, between_texels, parallax_terms
 
 if TYPE_CHECKING:
     import torch
@@ -38,6 +41,9 @@ class CompressedBtf:
     >>> table = hemisphere_table(15)
     >>> btf.photographs(all_pairs(table[:2], table)).shape
     (30, 6, 8, 3)
+    >>> from_above = np.array([[0.0, 0.0, 1.0]])
+    >>> btf.radiance_at(np.array([[0.25, 7.5]]), from_above, from_above).shape
+    (1, 3)
     """
 
     decoder: DecoderArrays
@@ -49,6 +55,14 @@ class CompressedBtf:
     """What the decoder's 1 stands for, in radiance (Eq. 5)."""
     height: int
     width: int
+    mips: tuple[NDArray[np.float32], ...] = ()
+    """Latents of coarser levels, each (texel, 8): of `latent_texture.level_sizes` but the first."""
+    parallax: NDArray[np.float32] | None = None
+    """(9, 2) texels, columns and rows, by which latents are looked up beside a place: factors of
+    `latent_texture.parallax_terms` of the view. None: nowhere."""
+    least: float = -math.inf
+    largest: float = math.inf
+    """Values over alpha are held to these: what was measured lies between them."""
 
     @property
     def texels(self) -> int:
@@ -57,9 +71,9 @@ class CompressedBtf:
 
     @property
     def payload_bytes(self) -> int:
-        """Bytes of decoder, latents and cluster numbers, as table 1 counts them."""
-        index = 0 if self.ids is None else self.ids.nbytes
-        return sum(part.nbytes for part in self.decoder.values()) + self.latents.nbytes + index
+        """Bytes of decoder, latents and cluster numbers as floats, as table 1 counts them."""
+        index = 0 if self.ids is None else 4 * len(self.ids)
+        return 4 * (sum(part.size for part in self.decoder.values()) + self.latents.size) + index
 
     def latents_of(self, texels: NDArray[np.integer] | slice) -> NDArray[np.float32]:
         """Latents (n, 8) of texels, numbered row by row."""
@@ -72,17 +86,18 @@ class CompressedBtf:
 
         ``directions`` (pair, 4) as `decoder_arrays.direction_inputs` gives them.
         """
-        import torch
-
         result = np.empty((last - first, len(directions), 3), np.float32)
-        step = max(1, _ROWS // len(directions))
-        decoder, where = self._network
-        inputs = torch.from_numpy(directions).to(where)
-        with torch.no_grad():
-            for start in range(first, last, step):
-                end = min(start + step, last)
-                latents = torch.from_numpy(self.latents_of(slice(start, end))).to(where)
-                result[start - first : end - first] = decoder.grid(latents, inputs).cpu().numpy()
+        if self.parallax is None:
+            self._decode_grid(self.latents_of(slice(first, last)), directions, result)
+            return result
+        texels = np.arange(first, last)
+        views, owner = np.unique(directions[:, 2:], axis=0, return_inverse=True)
+        for number, view in enumerate(views):
+            pairs = np.flatnonzero(owner.ravel() == number)
+            latents = self._latents_from(texels, np.repeat(view[None], len(texels), axis=0))
+            part = np.empty((len(texels), len(pairs), 3), np.float32)
+            self._decode_grid(latents, directions[pairs], part)
+            result[:, pairs] = part
         return result
 
     def photographs(self, pairs: Pairs) -> NDArray[np.float32]:
@@ -97,22 +112,102 @@ class CompressedBtf:
         light: NDArray[np.floating],
         view: NDArray[np.floating],
     ) -> NDArray[np.float32]:
-        """Radiance (n, 3) of texels (n,) for unit vectors (n, 3) to the light and to the view.
+        """Radiance (n, 3) of texels' middles (n,) for unit vectors (n, 3) to light and view.
 
         Directions are in the texture's frame: x along u, y along v, z along the normal.
         """
+        inputs = direction_inputs_of_vectors(light, view)
+        return self._decode(lambda part: self._latents_from(texels[part], inputs[part, 2:]), inputs)
+
+    def radiance_at(
+        self,
+        places: NDArray[np.floating],
+        light: NDArray[np.floating],
+        view: NDArray[np.floating],
+        footprint: NDArray[np.floating] | None = None,
+    ) -> NDArray[np.float32]:
+        """Radiance (n, 3) at places between texels, where the material repeats without end.
+
+        places (n, 2): u and v in tiles, v from a tile's lower edge; light, view (n, 3) as in
+        `radiance`. ``footprint`` (n,): width of what a pixel sees, in tiles: latents are taken
+        between levels. None: from the finest level.
+        """
+        inputs = direction_inputs_of_vectors(light, view)
+        columns = places[:, 0] * self.width - 0.5
+        rows = (1.0 - places[:, 1]) * self.height - 0.5
+
+        def latents(part: slice) -> NDArray[np.float32]:
+            across, down = self._offsets(inputs[part, 2:])
+            at = (rows[part] + down, columns[part] + across)
+            if footprint is None or not self.mips:
+                return between_texels(self._texture, self._size, *at)
+            seen = footprint[part] * max(self._size)
+            return between_levels((self._texture, *self.mips), self._size, at, seen)
+
+        return self._decode(latents, inputs)
+
+    # ---- looking up, decoding ----------------------------------------------------------------
+
+    def _latents_from(
+        self, texels: NDArray[np.integer], views: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Latents (n, 8) of texels' middles (n,), each from its view (n, 2)."""
+        if self.parallax is None:
+            return self.latents_of(texels)
+        across, down = self._offsets(views)
+        rows, columns = np.divmod(texels, self.width)
+        return between_texels(self._texture, self._size, rows + down, columns + across)
+
+    def _offsets(self, views: NDArray[np.float32]) -> NDArray[np.float32]:
+        """By how many columns and rows (2, n) latents are looked up beside a place."""
+        if self.parallax is None:
+            return np.zeros((2, len(views)), np.float32)
+        return (parallax_terms(views) @ self.parallax).T
+
+    def _decode(
+        self,
+        latents: Callable[[slice], NDArray[np.float32]],
+        inputs: NDArray[np.float32],
+    ) -> NDArray[np.float32]:
+        """Radiance (n, 3) of latents, asked for by parts, and of directions (n, 4)."""
         import torch
 
-        inputs = direction_inputs_of_vectors(light, view)
-        result = np.empty((len(texels), 3), np.float32)
+        result = np.empty((len(inputs), 3), np.float32)
         decoder, where = self._network
         with torch.no_grad():
-            for start in range(0, len(texels), _ROWS):
+            for start in range(0, len(inputs), _ROWS):
                 part = slice(start, start + _ROWS)
-                latents = torch.from_numpy(self.latents_of(texels[part])).to(where)
-                colours = decoder(latents, torch.from_numpy(inputs[part]).to(where))
-                result[part] = colours.cpu().numpy()
+                given = torch.from_numpy(latents(part)).to(where)
+                colours = decoder(given, torch.from_numpy(inputs[part]).to(where))
+                result[part] = colours.clamp(self.least, self.largest).cpu().numpy()
         return result * np.float32(self.alpha)
+
+    def _decode_grid(
+        self,
+        latents: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        result: NDArray[np.float32],
+    ) -> None:
+        """Values over alpha (n, pair, 3) of latents (n, 8) in every pair (pair, 4)."""
+        import torch
+
+        step = max(1, _ROWS // len(directions))
+        decoder, where = self._network
+        inputs = torch.from_numpy(np.ascontiguousarray(directions)).to(where)
+        with torch.no_grad():
+            for start in range(0, len(latents), step):
+                part = slice(start, start + step)
+                colours = decoder.grid(torch.from_numpy(latents[part]).to(where), inputs)
+                result[part] = colours.clamp(self.least, self.largest).cpu().numpy()
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self.height, self.width
+
+    @functools.cached_property
+    def _texture(self) -> NDArray[np.float32]:
+        """(M, 8) the finest level."""
+        return self.latents if self.ids is None else self.latents[self.ids]
 
     @functools.cached_property
     def _network(self) -> tuple[Decoder, torch.device]:
