@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,14 @@ from benchmarks.bad_input_files import (
     PLY,
     SPECIAL,
     Case,
+    btf_files,
     drive,
     glb,
     glb_body,
     pictures,
     with_png_checksums,
 )
+from storage.btf_file.layout import sealed
 from storage.packages.conformance import bad_packages
 
 
@@ -31,12 +34,31 @@ def named_cases() -> list[Case]:
         *_named_meshes(),
         *_named_glbs(),
         *_named_drives(),
+        *_named_btf_files(),
         *_named_specials(),
         *(Case(name, "package", name, {name: data}) for name, data in bad_packages().items()),
         Case("commas", "profile", "p.csv", {"p.csv": b"," * 1_000_000 + b"\n"}),
         Case("comments", "profile", "p.csv", {"p.csv": b"#\n" * 600_000}),
         Case("token", "profile", "p.csv", {"p.csv": b"v,n\n" + b"1" * 900_000 + b",2\n"}),
     ]
+
+
+def _named_btf_files() -> list[Case]:
+    """A billion texels that take no bytes, the largest image, and decoders as large as can be."""
+    image = btf_files()["image.tbtf"]
+
+    def changed(at: int, value: bytes) -> bytes:
+        return sealed(image[:at] + value + image[at + len(value) :])
+
+    cases = {
+        "billion texels": changed(16, struct.pack("<2HI", 65535, 16384, 65535 * 16384)),
+        "as many as can be": changed(16, struct.pack("<2HI", 1671, 1671, 1671 * 1671)),
+        "one line": changed(16, struct.pack("<2HI", 1, 65535, 65535)),
+        "wide layers": changed(40, struct.pack("<H", 4096)),
+        "no side": changed(36, b"\0"),
+        "newer": image[:4] + b"\2" + image[5:],
+    }
+    return [Case(name, "btf_file", "a.tbtf", {"a.tbtf": data}) for name, data in cases.items()]
 
 
 def _named_pictures() -> list[Case]:

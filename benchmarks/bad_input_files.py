@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from storage.btf_file import BtfFile, Quantised, write_btf_file
 from storage.packages.conformance import good_packages
 
 SPECIAL = ("folder", "pipe", "socket", "device")
@@ -65,6 +67,7 @@ def valid_cases() -> list[Case]:
             for case in _people_have("profiles", "profile", ending)
         ),
         *_btf_cases(),
+        *(Case(name, "btf_file", name, {name: data}) for name, data in btf_files().items()),
         drive("png"),
         drive("jpg"),
         *(Case(name, "package", name, {name: data}) for name, data in good_packages().items()),
@@ -294,6 +297,34 @@ def _ubo2014(width: int, height: int) -> bytes:
         factors = np.linspace(0.1, 1, 1 + 4 + width * height).astype("<f2")
         out += struct.pack("<BIII", 2, 1, 4, width * height) + factors.tobytes()
     return out
+
+
+def btf_files() -> dict[str, bytes]:
+    """Compressed BTFs: an image of symbols with everything, clusters, values as they are."""
+    chance = np.random.default_rng(0)
+
+    def symbols(*shape: int, steps: int | None = None) -> Quantised:
+        step = np.float32(0.125) if steps is None else np.full(steps, 0.25, np.float32)
+        return Quantised(np.rint(chance.normal(0, 3, shape)).astype(np.int32), np.array(step))
+
+    decoder: dict[str, Quantised | NDArray[np.float32]] = {
+        "weight_1": symbols(5, 7), "bias_1": np.ones(5, np.float32),
+        "weight_2": symbols(3, 5), "bias_2": symbols(3),
+    }  # fmt: skip
+    student = {"weight_1": symbols(3, 7), "bias_1": symbols(3)}
+    ids = np.arange(24 * 21, dtype=np.int32) % 7
+    mips = tuple(symbols(count, 3, steps=3) for count in (12 * 11, 6 * 6, 3 * 3))
+    parallax = np.full((9, 2), 0.5, np.float32)
+    values = {name: np.ones(tensor.symbols.shape, np.float32) for name, tensor in student.items()}
+    files = {
+        "image.tbtf": BtfFile(
+            decoder, symbols(24 * 21, 3, steps=3), 24, 21, 1.5, None, mips, parallax,
+            student=student,
+        ),
+        "clusters.tbtf": BtfFile(decoder, symbols(7, 3, steps=3), 24, 21, 1.5, ids, mips),
+        "paper.tbtf": BtfFile(values, np.ones((7, 3), np.float32), 24, 21, 1.5, ids),
+    }  # fmt: skip
+    return {name: write_btf_file(file) for name, file in files.items()}
 
 
 def drive_transforms(ending: str) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.bad_input_files import Case, glb, with_png_checksums, zipped
+from storage.btf_file.layout import HEADER, sealed
 from storage.packages.conformance import rehashed
 
 _NUMBER = re.compile(rb"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
@@ -45,7 +46,7 @@ def mutated(case: Case, chance: random.Random) -> Case:
 
 def _mutation_of(name: str, chance: random.Random) -> Callable[[bytes, random.Random], bytes]:
     ending = name.rsplit(".", 1)[-1]
-    special = {"json": _json, "glb": _glb, "zip": _zip, "tsuya": _package, "png": _png}.get(ending)
+    special = _SPECIAL.get(ending)
     if special and chance.random() < 0.6:
         return special
     if ending in ("ply", "obj", "mtl", "csv", "json", "hdr") and chance.random() < 0.6:
@@ -189,3 +190,14 @@ def _members(data: bytes, chance: random.Random) -> dict[str, bytes] | None:
 
 def _png(data: bytes, chance: random.Random) -> bytes:
     return with_png_checksums(chance.choice(_ON_BYTES)(data, chance))
+
+
+def _btf_file(data: bytes, chance: random.Random) -> bytes:
+    """With a length and a checksum that belong to it, so that what is behind them is met."""
+    found = chance.choice(_ON_BYTES)(data, chance)
+    return sealed(found) if len(found) >= HEADER.size else found
+
+
+_SPECIAL = {
+    "json": _json, "glb": _glb, "zip": _zip, "tsuya": _package, "png": _png, "tbtf": _btf_file,
+}  # fmt: skip

@@ -6,6 +6,7 @@ limit is killed, and another worker goes on behind that input.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import multiprocessing
 import os
@@ -28,6 +29,7 @@ from typing import Any, NamedTuple
 from benchmarks.bad_input_cases import named_cases
 from benchmarks.bad_input_files import Case, valid_cases
 from benchmarks.bad_input_mutations import mutated
+from storage.btf_file import read_btf_file, read_texel
 from storage.packages import read_package
 from storage.readers import BadInput
 from storage.readers.btf import open_btf
@@ -53,6 +55,13 @@ def _read_btf(path: Path) -> None:
     btf.read(0, min(2, btf.images))
 
 
+def _read_btf_file(path: Path) -> None:
+    data = path.read_bytes()
+    with contextlib.suppress(IndexError, BadInput):  # without the checksum
+        read_texel(data, 0, 1, 1, path.name)
+    read_btf_file(data, path.name)
+
+
 def _read_drive(path: Path) -> None:
     read_frame(read_drive(path), 0)
 
@@ -70,6 +79,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "scene": read_scene,
     "profile": read_profile,
     "btf": _read_btf,
+    "btf_file": _read_btf_file,
     "drive": _read_drive,
     "package": _read_package,
     "script": lambda path: runpy.run_path(str(path)),  # of the fuzzer's own tests

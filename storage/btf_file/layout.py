@@ -26,12 +26,13 @@ PARALLAX = 18
 A_STREAM = 2048
 """Symbols of a decoder's streams."""
 
-MOST_LATENTS = 1 << 25
-MOST_CHANNELS = 64
+MOST_LATENTS = 1 << 23
+"""Of the finest level: 1024 x 1024 texels of 8."""
+MOST_CHANNELS = 32
 MOST_LAYERS = 16
 MOST_WIDTH = 4096
-MOST_WEIGHTS = 1 << 24
-MOST_SIDE = 64
+MOST_WEIGHTS = 1 << 23
+MOST_SIDE = 32
 MOST_TABLES = 254
 
 

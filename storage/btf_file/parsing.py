@@ -243,7 +243,8 @@ def _model(
 ) -> tuple[list[Table], tuple[Ints, Ints]]:
     found = np.frombuffer(data, "<u2", section.bytes // 2, section.start)
     decoder = StreamDecoder(found, words[:1], [ENTRY_TABLE])
-    entries = iter(lambda: int(decoder.take(slice(None), 0)[0]), None)
+    only = np.zeros((1, 1), np.int64)
+    entries = iter(lambda: int(decoder.take(slice(None), only)[0, 0]), None)
     try:
         tables = [table_of_entries(entries) for _ in range(header.tables)]
     except ValueError as error:

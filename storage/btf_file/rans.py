@@ -79,18 +79,22 @@ class StreamDecoder:
         self._frequencies = np.concatenate([frequencies for _, frequencies, _ in slots])
         self._within = np.concatenate([within for _, _, within in slots])
 
-    def take(self, lanes: NDArray[np.integer] | slice, tables: Ints | int) -> Ints:
-        """The next symbol of each of these streams, by its table or by one of all."""
-        state = self._state[lanes]
-        cell = tables * TOTAL + (state & (TOTAL - 1))
-        state = self._frequencies[cell] * (state >> PRECISION) + self._within[cell]
-        low = state < LEAST_STATE
-        at = self._at[lanes]
+    def take(self, lanes: NDArray[np.integer] | slice, tables: Ints) -> Ints:
+        """The next symbols of each of these streams, (lane, n), by their tables, (lane or 1, n)."""
+        state, at = self._state[lanes], self._at[lanes]
+        found = np.empty((len(state), tables.shape[1]), np.int64)
         # What a damaged stream reads behind its end does not matter: `ended` tells.
-        word = self._words[np.minimum(at, len(self._words) - 1)]
-        self._state[lanes] = np.where(low, state << 16 | word, state)
-        self._at[lanes] = at + low
-        return self._symbols[cell]
+        last = len(self._words) - 1
+        for place, offset in enumerate(tables.T * TOTAL):
+            cell = (state & (TOTAL - 1)) + offset
+            found[:, place] = self._symbols.take(cell)
+            state = self._frequencies.take(cell) * (state >> PRECISION) + self._within.take(cell)
+            low = (state < LEAST_STATE).nonzero()[0]
+            if len(low):
+                state[low] = state[low] << 16 | self._words.take(np.minimum(at[low], last))
+                at[low] += 1
+        self._state[lanes], self._at[lanes] = state, at
+        return found
 
     def ended(self) -> bool:
         """Whether each stream is where its encoder began, all its words read."""
@@ -107,9 +111,8 @@ def decode_sequence(decoder: StreamDecoder, numbers: Ints, a_stream: int) -> Int
     padded = np.zeros(lanes * a_stream, np.int64)
     padded[:count] = numbers
     by_lane = padded.reshape(lanes, a_stream)
-    found = np.zeros((lanes, a_stream), np.int64)
     last = count - (lanes - 1) * a_stream
-    for step in range(min(a_stream, count)):
-        active = slice(0, lanes if step < last else lanes - 1)
-        found[active, step] = decoder.take(active, by_lane[active, step])
+    found = np.zeros((lanes, a_stream), np.int64)
+    found[:, :last] = decoder.take(slice(None), by_lane[:, :last])
+    found[:-1, last:] = decoder.take(slice(0, lanes - 1), by_lane[:-1, last:])
     return found.reshape(-1)[:count]

@@ -54,9 +54,8 @@ def read_texel(
     if not (0 <= row < rows and 0 <= column < columns):
         raise IndexError(f"texel is {row}, {column}; expected one of {rows} x {columns}.")
     if level == 0 and not header.predicted[0]:
-        return _vector(
-            file, _id(file, row * columns + column) if header.ids else row * columns + column
-        )
+        texel = row * columns + column
+        return _vector(file, _id(file, texel) if header.ids else texel)
     known: Ints | None = None
     for number in range(len(levels) - 1, level - 1, -1):
         across, down = column >> (number - level), row >> (number - level)
@@ -160,7 +159,7 @@ def _vector(file: ParsedFile, number: int) -> NDArray[Any]:
 
 
 def _tiles(file: ParsedFile, level: int, tiles: Ints, coarser: Ints | None) -> Ints:
-    """Symbols (tile, side, side, C) of tiles of a level, ``coarser`` those of the level above."""
+    """Symbols (tile, row, column, C) of tiles of a level, ``coarser`` those of the level above."""
     levels, group = file.levels, int(level > 0)
     before = sum(one.tiles for one in levels[1:level])
     section = "mips" if level else "latents"

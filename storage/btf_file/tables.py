@@ -41,7 +41,7 @@ class Table:
         """The table of levels of which one at least is not 0.
 
         >>> Table.of_levels(-1, [28, 32, 0, 28]).frequencies.tolist()
-        [1024, 2048, 0, 1024]
+        [1024, 2047, 0, 1025]
         """
         level = np.array(list(levels), np.int64)
         weights = np.where(level > 0, np.array([16, 19, 23, 27])[level % 4] << level // 4, 0)

@@ -31,6 +31,11 @@ class Level:
     side: int
 
     @property
+    def largest(self) -> tuple[int, int]:
+        """Rows and columns of the largest tile."""
+        return min(self.side, self.rows), min(self.side, self.columns)
+
+    @property
     def tile_columns(self) -> int:
         """Tiles side by side."""
         return -(-self.columns // self.side)
@@ -56,10 +61,11 @@ class Level:
         ]
 
     def joined(self, tiles: Ints) -> Ints:
-        """Texels (rows, columns, C) of all tiles (tile, side, side, C)."""
-        across = self.tile_columns
-        grid = tiles.reshape(-1, across, self.side, self.side, tiles.shape[-1]).swapaxes(1, 2)
-        whole = grid.reshape(-1, across * self.side, tiles.shape[-1])
+        """Texels (rows, columns, C) of all tiles (tile, row, column, C) of the largest's size."""
+        rows, columns = self.largest
+        across, channels = self.tile_columns, tiles.shape[-1]
+        grid = tiles.reshape(-1, across, rows, columns, channels).swapaxes(1, 2)
+        whole = grid.reshape(-1, across * columns, channels)
         return whole[: self.rows, : self.columns]
 
 
@@ -75,8 +81,8 @@ def differences(found: Ints, predicted: Ints) -> Ints:
 
 def predicted(around: Ints, coefficients: Ints) -> Ints:
     """The prediction (…) of the five around it (…, 5) and their coefficients (…, 5), in 1/32."""
-    half = 1 << (_FRACTION - 1)
-    return np.clip((around * coefficients).sum(axis=-1) + half >> _FRACTION, LEAST, LARGEST)
+    found = np.einsum("...i,...i", around, coefficients) + (1 << (_FRACTION - 1)) >> _FRACTION
+    return np.minimum(np.maximum(found, LEAST), LARGEST)
 
 
 def surroundings(level: Level, texels: Ints, coarser: Ints | None) -> Ints:
@@ -116,14 +122,14 @@ def decode_tiles(
     coefficients: Ints,
     numbers: Ints,
 ) -> Ints:
-    """Symbols (tile, side, side, C) of these tiles of a level, 0 outside the level.
+    """Symbols (tile, row, column, C) of these tiles of a level, 0 outside the level.
 
     ``decoder``: their streams; ``parents`` (tile, side / 2, side / 2, C): the part of the coarser
     level above each; ``coefficients`` (4, C, 5) by phase; ``numbers`` (C,): each channel's table.
     """
     rows, columns = level.sizes(tiles)
-    side, channels = level.side, len(numbers)
-    found = np.zeros((len(tiles), side, side, channels), np.int64)
+    channels = len(numbers)
+    found = np.zeros((len(tiles), *level.largest, channels), np.int64)
     for row in range(int(rows.max())):
         for column in range(int(columns.max())):
             lanes = np.flatnonzero((rows > row) & (columns > column))
@@ -143,27 +149,24 @@ def decode_tiles(
             if parents is not None:
                 around[..., 4] = parents[lanes, row // 2, column // 2]
             guess = predicted(around, coefficients[2 * (row % 2) + column % 2])
-            for channel in range(channels):
-                value = guess[:, channel] + decoder.take(lanes, int(numbers[channel]))
-                found[lanes, row, column, channel] = (value - LEAST & 255) + LEAST
+            coded = decoder.take(lanes, numbers[None])
+            found[lanes, row, column] = (guess + coded - LEAST & 255) + LEAST
     return found
 
 
 def parents_of(level: Level, tiles: Ints, coarser: Level, known: Ints) -> Ints:
     """What lies above these tiles, (tile, side / 2, side / 2, C), of tiles of the coarser level.
 
-    ``known`` (tile, side, side, C): all tiles of the coarser level, or the one that is above.
+    ``known`` (tile, row, column, C): all tiles of the coarser level, or the one that is above.
     """
     down, across = np.divmod(tiles, level.tile_columns)
     above = down // 2 * coarser.tile_columns + across // 2 if len(known) > 1 else 0 * tiles
     half = level.side // 2
-    row, column = down % 2 * half, across % 2 * half
-    inside = np.arange(half)
-    return known[
-        above[:, None, None],
-        (row[:, None] + inside)[:, :, None],
-        (column[:, None] + inside)[:, None, :],
-    ]
+    row, column = (
+        np.minimum((place % 2 * half)[:, None] + np.arange(half), most - 1)
+        for place, most in zip((down, across), coarser.largest, strict=True)
+    )
+    return known[above[:, None, None], row[:, :, None], column[:, None, :]]
 
 
 def fitted_coefficients(
