@@ -12,6 +12,8 @@ from pipelines.light.directions import Pairs
 from pipelines.neural_btf.abrdf_pool import AbrdfReader
 from pipelines.neural_btf.compressed import CompressedBtf
 from pipelines.neural_btf.decoder_arrays import direction_inputs
+from pipelines.neural_btf.quality import judged_images, quality_figures
+from pipelines.neural_btf.quality_sums import compare
 
 
 class RestorationErrors(NamedTuple):
@@ -23,6 +25,15 @@ class RestorationErrors(NamedTuple):
     """(image,)."""
     of_texel: NDArray[np.float64]
     """(texel,)."""
+    quality: dict[str, float]
+    """All figures of `quality`, with their nulls."""
+
+
+def restored_abrdfs(compressed: CompressedBtf, pairs: Pairs) -> AbrdfReader:
+    """A reader of restored ABRDFs (texel, image, 3), radiance: what `quality.quality` compares."""
+    directions = direction_inputs(pairs)
+    alpha = np.float32(compressed.alpha)
+    return lambda first, last: compressed.abrdfs(first, last, directions) * alpha
 
 
 def restoration_errors(
@@ -33,9 +44,9 @@ def restoration_errors(
     block: int,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> RestorationErrors:
-    """Compare all of a BTF with what is restored, ``block`` texels at a time.
+    """Compare all of a BTF with what is restored, about ``block`` texels at a time.
 
-    ``read`` gives measured ABRDFs (texel, image, 3).
+    ``read`` gives measured ABRDFs (texel, image, 3), radiance.
 
     >>> from pipelines.light.directions import all_pairs, hemisphere_table
     >>> from pipelines.neural_btf.compressed import CompressedBtf
@@ -48,19 +59,19 @@ def restoration_errors(
     >>> errors.rmse < 1e-6, errors.of_image.shape, errors.of_texel.shape
     (True, (225,), (12,))
     """
-    directions = direction_inputs(pairs)
-    of_image = np.zeros(len(directions))
-    of_texel = np.zeros(compressed.texels)
-    for first in range(0, compressed.texels, block):
-        last = min(first + block, compressed.texels)
-        step = compressed.abrdfs(first, last, directions)
-        step -= read(first, last).astype(np.float32) / np.float32(compressed.alpha)
-        squares = np.einsum("tic,tic->ti", step, step).astype(np.float64) / 3
-        of_image += squares.sum(axis=0)
-        of_texel[first:last] = squares.mean(axis=1)
-        progress(last / compressed.texels)
+    compared = compare(
+        restored_abrdfs(compressed, pairs),
+        read,
+        pairs,
+        (compressed.height, compressed.width),
+        judged=judged_images(pairs),
+        block=block,
+        progress=progress,
+    )
+    figures = quality_figures(compared, pairs, compressed.alpha)
     return RestorationErrors(
-        float(np.sqrt(of_texel.mean())),
-        np.sqrt(of_image / compressed.texels),
-        np.sqrt(of_texel),
+        figures["rmse"],
+        np.sqrt(compared.of_image) / compressed.alpha,
+        np.sqrt(compared.of_texel) / compressed.alpha,
+        figures,
     )
