@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 
 PROJECT = Path(__file__).resolve().parent.parent
 SHADERS = PROJECT / "pipelines" / "drawing" / "shaders"
-_HASHED_PACKAGES = ("pipelines", "storage.packages", "storage.readers")
+_HASHED_PACKAGES = ("pipelines", "storage.btf_file", "storage.packages", "storage.readers")
 _DIGITS = 16
 _KEPT = (
     Path(__file__).parent

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pipelines.light.directions import Pairs
 from pipelines.neural_btf.abrdf import PhotographBlocks, check_values, transposed_view
-from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.compressed import CompressedBtf
 from pipelines.neural_btf.decoder_arrays import DECODER_ARRAY_NAMES, DecoderArrays
+from storage.btf_file.contents import BtfFile
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
 
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.neural_btf.clusters import AbrdfClusters
-    from pipelines.neural_btf.panel import Frames
+    from pipelines.neural_btf.draping.frames import ClothFrames
     from pipelines.neural_btf.principal_abrdfs import AbrdfSummary
     from pipelines.neural_btf.restoration import RestorationErrors
+    from pipelines.neural_btf.training.fine_tuning import QuantisedNetwork
     from pipelines.neural_btf.training.trainer import TrainedNetwork
 
 _PIXELS = ("y", "x")
@@ -184,6 +186,8 @@ def neural_btf_dataset(trained: TrainedNetwork) -> xr.Dataset:
         "curve_step": ("point", trained.curve_step),
         "curve_rmse": ("point", trained.curve_rmse),
     }
+    if trained.parallax is not None:
+        variables["parallax"] = (("monomial", "axis"), trained.parallax)
     if trained.encoder_residual is not None:
         variables["encoder_residual"] = ((), trained.encoder_residual)
     return xr.Dataset(variables, attrs={"widths": list(trained.encoder.widths)})
@@ -194,11 +198,12 @@ def trained_network_of(dataset: xr.Dataset, images: int) -> TrainedNetwork:
     from pipelines.neural_btf.network import decoder_of, encoder_of
     from pipelines.neural_btf.training.trainer import TrainedNetwork
 
-    residual = dataset.get("encoder_residual")
+    residual, parallax = dataset.get("encoder_residual"), dataset.get("parallax")
     return TrainedNetwork(
         encoder_of(dataset["encoder"].values, images, dataset.attrs["widths"]),
         decoder_of(decoder_arrays_of(dataset)),
         dataset["latents"].values,
+        None if parallax is None else parallax.values,
         dataset["curve_step"].values,
         dataset["curve_rmse"].values,
         None if residual is None else float(residual),
@@ -206,58 +211,101 @@ def trained_network_of(dataset: xr.Dataset, images: int) -> TrainedNetwork:
 
 
 def decoder_arrays_of(dataset: xr.Dataset) -> DecoderArrays:
-    """The decoder's arrays in a `neural_btf` or `compressed_btf` dataset."""
+    """The decoder's arrays in a `neural_btf` dataset."""
     return {name: dataset[name].values for name in DECODER_ARRAY_NAMES}
 
 
 def _decoder_variables(arrays: DecoderArrays) -> dict[str, Any]:
     """A decoder's arrays with the dimensions that the schemas give them."""
-    declared = schemas.COMPRESSED_BTF.variables
+    declared = schemas.NEURAL_BTF.variables
     return {name: (declared[name].dims, values) for name, values in arrays.items()}
 
 
 # ---- compressed BTF --------------------------------------------------------------------------
 
 
-def packed_btf(
+def float_btf_file(
     neural_btf: xr.Dataset, abrdf_clusters: xr.Dataset, abrdf_matrix: xr.Dataset
-) -> CompressedBtf:
-    """The runtime BTF of a trained network, put together from what three assets hold."""
-    return compressed_btf(
+) -> BtfFile:
+    """The paper's form of a trained network: all numbers in float32, as table 1 counts them."""
+    ids, parallax = abrdf_clusters["ids"].values, neural_btf.get("parallax")
+    return BtfFile(
         decoder_arrays_of(neural_btf),
         neural_btf["latents"].values,
-        abrdf_clusters["ids"].values,
-        float(abrdf_matrix["alpha"]),
-        (int(abrdf_matrix["height"]), int(abrdf_matrix["width"])),
+        **_about(abrdf_matrix),
+        ids=ids if abrdf_clusters.sizes["cluster"] < len(ids) else None,
+        parallax=None if parallax is None else parallax.values,
     )
 
 
-def compressed_btf_dataset(compressed: CompressedBtf) -> xr.Dataset:
-    """`compressed_btf` of a runtime BTF."""
+def quantised_btf_file(
+    network: QuantisedNetwork, abrdf_clusters: xr.Dataset, abrdf_matrix: xr.Dataset
+) -> BtfFile:
+    """A network that was trained to be quantised."""
+    from storage.btf_file import Quantised
+
+    ids = abrdf_clusters["ids"].values
+    return BtfFile(
+        {name: Quantised(*part) for name, part in network.decoder.items()},
+        Quantised(network.latents, network.latent_steps),
+        **_about(abrdf_matrix),
+        ids=ids if abrdf_clusters.sizes["cluster"] < len(ids) else None,
+        mips=tuple(Quantised(level, network.mip_steps) for level in network.mips),
+        parallax=network.parallax,
+    )
+
+
+def _about(abrdf_matrix: xr.Dataset) -> dict[str, Any]:
+    return {
+        "height": int(abrdf_matrix["height"]),
+        "width": int(abrdf_matrix["width"]),
+        "alpha": float(abrdf_matrix["alpha"]),
+    }
+
+
+def compressed_btf_dataset(
+    btf: BtfFile, curve: tuple[NDArray[np.int64], NDArray[np.float64]] | None = None
+) -> xr.Dataset:
+    """`compressed_btf` of what its file holds; ``curve``: steps and RMSE of its training."""
     import numpy as np
     import xarray as xr
 
-    variables = {
-        **_decoder_variables(compressed.decoder),
-        "latents": (("cluster", "latent"), compressed.latents),
-        "alpha": ((), compressed.alpha),
-        "height": ((), np.int32(compressed.height)),
-        "width": ((), np.int32(compressed.width)),
-    }
-    if compressed.ids is not None:
-        variables["ids"] = ("texel", compressed.ids)
+    from storage.btf_file import write_btf_file
+
+    variables: dict[str, Any] = {"file": ("byte", np.frombuffer(write_btf_file(btf), np.uint8))}
+    if curve is not None:
+        variables |= {"curve_step": ("point", curve[0]), "curve_rmse": ("point", curve[1])}
     return xr.Dataset(variables)
+
+
+def btf_file_of(dataset: xr.Dataset) -> BtfFile:
+    """What the file in a `compressed_btf` dataset holds."""
+    from storage.btf_file import read_btf_file
+
+    return read_btf_file(dataset["file"].values.tobytes(), "compressed_btf")
 
 
 def compressed_btf_of(dataset: xr.Dataset) -> CompressedBtf:
     """The runtime BTF that a `compressed_btf` dataset holds."""
+    return runtime_btf(btf_file_of(dataset))
+
+
+def runtime_btf(btf: BtfFile) -> CompressedBtf:
+    """The runtime BTF of a file: its numbers as float32."""
+    from storage.btf_file import values_of
+
     return CompressedBtf(
-        decoder_arrays_of(dataset),
-        dataset["latents"].values,
-        dataset["ids"].values if "ids" in dataset else None,
-        float(dataset["alpha"]),
-        int(dataset["height"]),
-        int(dataset["width"]),
+        {name: values_of(part) for name, part in btf.decoder.items()},
+        values_of(btf.latents),
+        btf.ids,
+        btf.alpha,
+        btf.height,
+        btf.width,
+        tuple(values_of(level) for level in btf.mips),
+        btf.parallax,
+        btf.least,
+        btf.largest,
+        {name: values_of(part) for name, part in btf.student.items()} or None,
     )
 
 
@@ -283,7 +331,7 @@ def restored_images_dataset(
             "restored": (("pair", *_PIXELS, "channel"), compressed.photographs(chosen)),
             "pair_light": (("pair", "angle"), chosen.light),
             "pair_view": (("pair", "angle"), chosen.view),
-            "rmse": ((), errors.rmse),
+            **{name: ((), value) for name, value in errors.quality.items()},
             "rmse_image": ("image", errors.of_image),
             "rmse_texel": (_PIXELS, errors.of_texel.reshape(compressed.height, compressed.width)),
             "light": btf_images["light"],
@@ -292,15 +340,22 @@ def restored_images_dataset(
     )
 
 
-def cloth_frames_dataset(frames: Frames, lights: NDArray[np.float64]) -> xr.Dataset:
-    """`cloth_frames` of pictures under lights (frame, 2)."""
+def cloth_frames_dataset(frames: ClothFrames) -> xr.Dataset:
+    """`cloth_frames` of pictures of the draped cloth."""
+    import numpy as np
     import xarray as xr
 
+    from pipelines.neural_btf.draping.frames import CAMERA_AZIMUTH, SUN_AZIMUTH
+
+    turns = 360.0 * np.arange(len(frames.orbit)) / len(frames.orbit)
     return xr.Dataset(
         {
-            "frames": (("frame", *_PIXELS, "channel"), frames.pictures),
-            "light_direction": (("frame", "angle"), lights),
-            "coverage": ((), frames.coverage),
+            "orbit": (("frame", *_PIXELS, "channel"), frames.orbit),
+            "moving_light": (("frame", *_PIXELS, "channel"), frames.moving_light),
+            "closeup": ((*_PIXELS, "channel"), frames.closeup),
+            "camera_azimuth": ("frame", CAMERA_AZIMUTH + turns),
+            "sun_azimuth": ("frame", SUN_AZIMUTH + turns),
+            "compared": (("shot", "material", "small_y", "small_x", "channel"), frames.compared),
         }
     )
 

@@ -1,4 +1,4 @@
-"""Training, and what is kept of it: `neural_btf`, `compressed_btf`."""
+"""Training: `neural_btf`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,7 @@ from assets_defs.checks import Check
 from assets_defs.neural_btf.datasets import (
     abrdf_clusters_of,
     abrdf_reader,
-    compressed_btf_dataset,
-    compressed_btf_of,
-    decoder_arrays_of,
     neural_btf_dataset,
-    packed_btf,
     pairs_of,
 )
 from assets_defs.neural_btf.declaration import BTF
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
 
     from pipelines.neural_btf.training.data import TrainingData
 
-_POOL_BYTES = 6 << 30
+POOL_BYTES = 6 << 30
 
 
 # ---- neural_btf ------------------------------------------------------------------------------
@@ -51,6 +47,9 @@ class NetworkSettings(Settings):
     rate: float = Field(0.01, gt=0.0, le=1.0, description="Fast: largest learning rate")
     batch_texels: int = Field(64, ge=1, description="Fast: texels of a batch")
     batch_images: int = Field(128, ge=1, description="Fast: photographs of a batch")
+    parallax: bool = Field(
+        True, description="Fast, without clusters: look latents up beside a texel, by the view"
+    )
     warm_start: WarmStart = Field("pca", description="Fast: where the latents start")
     encoder_share: float = Field(
         0.25, ge=0.0, le=1.0, description="Warm start encoder: share of the steps through it"
@@ -107,6 +106,7 @@ def training_plan(settings: NetworkSettings) -> TrainingPlan:
         warm_start=settings.warm_start,
         encoder_share=settings.encoder_share,
         encoder_steps=settings.encoder_steps,
+        parallax=settings.parallax,
         targets=settings.targets,
         seed=settings.network_seed,
     )
@@ -126,7 +126,7 @@ def stored_training_data(
         texels,
         images,
         block=abrdfs.chunks[0][0] if abrdfs.chunks else texels,
-        budget=_POOL_BYTES,
+        budget=POOL_BYTES,
         seed=plan.seed,
     )
     return training_data(
@@ -138,6 +138,7 @@ def stored_training_data(
             float(abrdf_matrix["alpha"]),
         ),
         direction_inputs(pairs_of(abrdf_matrix)),
+        (int(abrdf_matrix["height"]), int(abrdf_matrix["width"])),
         plan,
     )
 
@@ -197,62 +198,3 @@ def neural_btf(
         trained = train(data, plan, resume=work.read(), keep=work.keep, progress=progress)
     shown = {"RMSE of the last batches": float(trained.curve_rmse[-1])}
     return neural_btf_dataset(trained), shown
-
-
-# ---- compressed_btf --------------------------------------------------------------------------
-
-
-class PackSettings(Settings):
-    """Nothing to choose: the payload is the paper's."""
-
-
-def _bytes_over_table(version: StoredVersion) -> float:
-    return figures.bytes_over_table(compressed_btf_of(version.dataset))
-
-
-def _decoding_error(version: StoredVersion) -> float:
-    trained = version.input("neural_btf").load()
-    ids = version.input("abrdf_clusters")["ids"].values
-    return figures.decoding_error(
-        compressed_btf_of(version.dataset),
-        decoder_arrays_of(trained),
-        trained["latents"].values[ids],
-        direction_inputs(pairs_of(version.input("abrdf_matrix"))),
-    )
-
-
-@BTF.asset(
-    schemas.COMPRESSED_BTF,
-    by=("material", "clusters"),
-    settings=PackSettings,
-    inputs=("abrdf_matrix", "abrdf_clusters", "neural_btf"),
-    checks=(
-        Check(
-            "bytes_over_table",
-            "Bytes of decoder, latents and index list, difference from the paper's table 1.",
-            _bytes_over_table,
-            at_most=0.0,
-        ),
-        Check(
-            "decoding_error",
-            "Largest difference of decoded values from the trained network's, over alpha.",
-            _decoding_error,
-            at_most=1e-4,
-        ),
-    ),
-)
-def compressed_btf(
-    settings: PackSettings,
-    abrdf_matrix: xr.Dataset,
-    abrdf_clusters: xr.Dataset,
-    neural_btf: xr.Dataset,
-) -> Result:
-    """Put together what is needed at run time."""
-    packed = packed_btf(neural_btf, abrdf_clusters, abrdf_matrix)
-    values = abrdf_matrix["abrdfs"].size
-    shown = {
-        "payload bytes": packed.payload_bytes,
-        "ratio to float32": values * 4 / packed.payload_bytes,
-        "ratio to 8 bit": values / packed.payload_bytes,
-    }
-    return compressed_btf_dataset(packed), shown

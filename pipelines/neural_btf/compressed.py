@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,6 +63,8 @@ class CompressedBtf:
     least: float = -math.inf
     largest: float = math.inf
     """Values over alpha are held to these: what was measured lies between them."""
+    student: DecoderArrays | None = None
+    """A smaller decoder of the same latents, for real time."""
 
     @property
     def texels(self) -> int:
@@ -74,6 +76,12 @@ class CompressedBtf:
         """Bytes of decoder, latents and cluster numbers as floats, as table 1 counts them."""
         index = 0 if self.ids is None else 4 * len(self.ids)
         return 4 * (sum(part.size for part in self.decoder.values()) + self.latents.size) + index
+
+    def by_student(self) -> CompressedBtf:
+        """The same, decoded by the student. Raises ValueError where there is none."""
+        if self.student is None:
+            raise ValueError("student is missing; expected a file with a second decoder.")
+        return replace(self, decoder=self.student, student=None)
 
     def latents_of(self, texels: NDArray[np.integer] | slice) -> NDArray[np.float32]:
         """Latents (n, 8) of texels, numbered row by row."""
@@ -224,9 +232,11 @@ def compressed_btf(
     ids: NDArray[np.integer],
     alpha: float,
     size: tuple[int, int],
+    parallax: NDArray[np.float32] | None = None,
 ) -> CompressedBtf:
     """What is needed at run time of latents (k, 8), for photographs of ``size`` (rows, columns).
 
     The cluster numbers ``ids`` (texel,) are left out where every texel has latents of its own.
     """
-    return CompressedBtf(decoder, latents, ids if len(latents) < len(ids) else None, alpha, *size)
+    shared = ids if len(latents) < len(ids) else None
+    return CompressedBtf(decoder, latents, shared, alpha, *size, parallax=parallax)

@@ -57,6 +57,7 @@ def compress_photographs(
         found,
         AbrdfScale(summary.statistics.mean, summary.statistics.deviation, summary.alpha),
         direction_inputs(pairs),
+        (images.shape[1], images.shape[2]),
         plan,
     )
     trained = train(data, plan, progress=progress)
@@ -66,4 +67,5 @@ def compress_photographs(
         found.ids,
         summary.alpha,
         images.shape[1:3],
+        trained.parallax,
     )

@@ -73,14 +73,17 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """12 inputs (8 latents, light, view on the stereographic plane), 3 x 106 neurons, RGB."""
+    """12 inputs (8 latents, light, view on the stereographic plane), 3 x 106 neurons, RGB.
 
-    def __init__(self) -> None:
+    ``hidden``: neurons of a hidden layer, 106 in the paper; a student has fewer.
+    """
+
+    def __init__(self, hidden: int = HIDDEN) -> None:
         super().__init__()
-        self.first = nn.Linear(LATENTS + DIRECTIONS, HIDDEN)
-        self.second = nn.Linear(HIDDEN, HIDDEN)
-        self.third = nn.Linear(HIDDEN, HIDDEN)
-        self.last = nn.Linear(HIDDEN, 3)
+        self.first = nn.Linear(LATENTS + DIRECTIONS, hidden)
+        self.second = nn.Linear(hidden, hidden)
+        self.third = nn.Linear(hidden, hidden)
+        self.last = nn.Linear(hidden, 3)
 
     @property
     def layers(self) -> tuple[nn.Linear, ...]:
@@ -100,8 +103,17 @@ class Decoder(nn.Module):
         of_latents = latents @ self.first.weight[:, :LATENTS].T
         of_directions = directions @ self.first.weight[:, LATENTS:].T + self.first.bias
         summed = of_latents[:, None] + of_directions[None]
-        colours = self._after_first(summed.reshape(-1, HIDDEN))
+        colours = self._after_first(summed.flatten(0, 1))
         return colours.reshape(len(latents), len(directions), 3)
+
+    def grid_by_view(self, latents: Tensor, directions: Tensor) -> Tensor:
+        """RGB over alpha, (texel, view * light, 3): latents (texel, view, 8), which differ by the
+        view, with pairs of directions (view, light, 4)."""
+        of_latents = latents @ self.first.weight[:, :LATENTS].T
+        of_directions = directions @ self.first.weight[:, LATENTS:].T + self.first.bias
+        summed = of_latents[:, :, None] + of_directions[None]
+        colours = self._after_first(summed.flatten(0, 2))
+        return colours.reshape(len(latents), -1, 3)
 
     def _after_first(self, values: Tensor) -> Tensor:
         hidden = torch.relu(self.third(torch.relu(self.second(torch.relu(values)))))
@@ -125,7 +137,7 @@ def decoder_arrays(decoder: Decoder) -> dict[str, NDArray[np.float32]]:
 
 def decoder_of(arrays: DecoderArrays) -> Decoder:
     """The decoder of arrays named as `decoder_arrays` names them."""
-    decoder = Decoder()
+    decoder = Decoder(len(arrays["bias_1"]))
     with torch.no_grad():
         for number, layer in enumerate(decoder.layers, start=1):
             for kind, part in (("weight", layer.weight), ("bias", layer.bias)):

@@ -107,11 +107,16 @@ ABRDF_CLUSTERS = Schema(
 NEURAL_BTF = Schema(
     _SYSTEM,
     "neural_btf",
-    1,
+    2,
     "The trained network: encoder, decoder, latents, loss curve.",
     {
         **_decoder(),
         "latents": Variable(("cluster", "latent"), "float32", "1", "Latent vectors", "figure 5"),
+        "parallax": Variable(
+            ("monomial", "axis"), "float32", "texel",
+            "Columns and rows by which latents are looked up beside a texel, by the view",
+            optional=True,
+        ),
         "encoder": Variable(
             ("parameter",), "float32", "1", "Parameters and batch statistics of the encoder",
             "figure 5",
@@ -133,25 +138,65 @@ NEURAL_BTF = Schema(
 COMPRESSED_BTF = Schema(
     _SYSTEM,
     "compressed_btf",
-    1,
-    "The runtime BTF of table 1: decoder, latents and, where texels share them, the index list.",
+    2,
+    "The runtime BTF as one file: decoder, latents, and which texel has which (docs/btf_file.md).",
     {
-        **_decoder(),
-        "latents": Variable(("cluster", "latent"), "float32", "1", "Latent vectors", "table 1"),
-        "ids": Variable(
-            ("texel",), "int32", "1", "Latent vector of every texel", "table 1", optional=True
+        "file": Variable(("byte",), "uint8", "1", "Bytes of the `.tbtf` file", "table 1"),
+        "curve_step": Variable(
+            ("point",), "int64", "1", "Steps of training with quantisation", optional=True
         ),
-        "alpha": Variable((), "float64", "1", "Radiance that the decoder's 1 stands for", "Eq. 5"),
-        "height": Variable((), "int32", "texels", "Rows of texels"),
-        "width": Variable((), "int32", "texels", "Texels of a row"),
+        "curve_rmse": Variable(
+            ("point",), "float64", "alpha", "Root of the mean squared error since the point before",
+            optional=True,
+        ),
     },
-)
+)  # fmt: skip
+
+
+
+def _quality() -> dict[str, Variable]:
+    """Figures of restored photographs, each beside that of restorations that know nothing.
+
+    Optional are those of views that not every material was photographed from, and of SSIM, which
+    small photographs have not.
+    """
+    null, shuffled = "of every photograph's mean colour", "of restored texels in a drawn order"
+    nulls = {"_null": null, "_shuffled": shuffled}
+    grazing = "views at 60 degrees and more"
+    deviation, contrast = "over the deviation of all values", "over the RMSE of mean colours"
+    kinds: dict[str, tuple[str, str, tuple[str, ...]]] = {
+        "rmse": ("alpha", "RMSE over all photographs and texels", ("_null", "_shuffled")),
+        "rmse_over_deviation": ("1", f"RMSE {deviation}", ("_null",)),
+        "rmse_over_null": ("1", f"RMSE {contrast}", ("_shuffled",)),
+        "rmse_over_null_60": ("1", f"RMSE {contrast}, {grazing}", ("_shuffled",)),
+        "worst_photographs": ("1", f"RMSE of the worst tenth, {deviation}", ("_null",)),
+        "worst_texels": ("1", f"RMSE of the worst tenth, {deviation}", ("_null",)),
+        "grazing_detail": ("1", f"Gradients kept and right, {grazing}", ()),
+        "grazing_energy": ("1", f"Energy of gradients over the measured, {grazing}", ()),
+    }
+    for name, units, words in (
+        ("psnr", "dB", "PSNR of judged photographs as pictures"),
+        ("ssim", "1", "SSIM of judged photographs as pictures"),
+        ("flip", "1", "FLIP of judged photographs as pictures"),
+    ):
+        kinds[name] = (units, words, tuple(nulls))
+        kinds[f"{name}_60"] = (units, f"{words}, {grazing}", tuple(nulls))
+    found = {}
+    for name, (units, words, beside) in kinds.items():
+        optional = "60" in name or "grazing" in name or "ssim" in name
+        source = "Eq. 10" if name == "rmse" else ""
+        found[name] = Variable((), "float64", units, words, source, optional=optional)
+        for null_name in beside:
+            meaning = f"{words}, {nulls[null_name]}"
+            found[name + null_name] = Variable((), "float64", units, meaning, optional=optional)
+    return found
+
 
 RESTORED_IMAGES = Schema(
     _SYSTEM,
     "restored_images",
-    1,
-    "Restored photographs beside the measured ones, and the errors of all.",
+    2,
+    "Restored photographs beside the measured ones, the errors of all, figures of quality.",
     {
         "original": Variable(
             ("pair", *_PIXELS, "channel"), "float32", "1", "Measured linear RGB", "figure 7"
@@ -161,7 +206,7 @@ RESTORED_IMAGES = Schema(
         ),
         "pair_light": Variable(("pair", "angle"), "float64", "radian", "Light: theta, phi"),
         "pair_view": Variable(("pair", "angle"), "float64", "radian", "View: theta, phi"),
-        "rmse": Variable((), "float64", "alpha", "Over all photographs and texels", "Eq. 10"),
+        **_quality(),
         "rmse_image": Variable(("image",), "float64", "alpha", "Of every photograph"),
         "rmse_texel": Variable(_PIXELS, "float64", "alpha", "Of every texel"),
         "light": Variable(("image", "angle"), "float64", "radian", "Light: theta, phi"),
@@ -172,18 +217,28 @@ RESTORED_IMAGES = Schema(
 CLOTH_FRAMES = Schema(
     _SYSTEM,
     "cloth_frames",
-    1,
-    "A folded panel of the material under a light that moves around it.",
+    2,
+    "A draped cloth of the material under a sky with a sun: around it, the sun around it, close.",
     {
-        "frames": Variable(
-            ("frame", *_PIXELS, "channel"), "uint8", "1", "sRGB pictures, one a light"
+        "orbit": Variable(
+            ("frame", *_PIXELS, "channel"), "uint8", "1", "sRGB pictures; the camera goes around",
+            "figure 8",
         ),
-        "light_direction": Variable(
-            ("frame", "angle"), "float64", "radian", "Light in the panel's frame: theta, phi"
+        "moving_light": Variable(
+            ("frame", *_PIXELS, "channel"), "uint8", "1", "sRGB pictures; the sun goes around",
         ),
-        "coverage": Variable((), "float64", "1", "Share of the picture's pixels with cloth"),
+        "closeup": Variable(
+            (*_PIXELS, "channel"), "uint8", "1", "sRGB picture from a hand's breadth away"
+        ),
+        "camera_azimuth": Variable(("frame",), "float64", "degree", "Of the orbit's camera"),
+        "sun_azimuth": Variable(("frame",), "float64", "degree", "Of the moving light's sun"),
+        "compared": Variable(
+            ("shot", "material", "small_y", "small_x", "channel"), "float32", "1",
+            "The orbit's first picture and the close-up, small, of the measured BTF and of its mean "
+            "colour: linear RGB, exposed as these are; NaN where the first has no cloth",
+        ),
     },
-)
+)  # fmt: skip
 
 BTF_PACKAGE = Schema(
     _SYSTEM,

@@ -12,6 +12,8 @@ from pipelines.neural_btf.training.data import TrainingData
 
 _STEPS_A_PART = 500
 """Steps that draw from one part of the pool before the next part is read."""
+_VIEWS = 8
+"""Views of a batch that looks latents up by the view: once a texel and view, not once a pair."""
 
 
 class Batch(NamedTuple):
@@ -30,11 +32,31 @@ class Batches:
         self._data = data
         self._cumulated = np.zeros(0)
         self._part = -1
+        _, view = np.unique(data.directions[:, 2:], axis=0, return_inverse=True)
+        self._view = view.ravel()
+        order = np.argsort(self._view, kind="stable")
+        self._of_view = np.split(order, np.cumsum(np.bincount(self._view))[:-1])
 
     def images(self, random: np.random.Generator, count: int) -> NDArray[np.int64]:
         """Numbers of photographs; never more than there are."""
         images = len(self._data.directions)
         return random.integers(0, images, min(count, images))
+
+    def images_by_view(
+        self,
+        random: np.random.Generator,
+        count: int,
+        among: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.int64]:
+        """Numbers of photographs (view, light): `_VIEWS` views, drawn, and lights of each.
+
+        ``among``: photographs of whole views that may be drawn; None: all.
+        """
+        known = len(self._of_view)
+        allowed = np.arange(known) if among is None else np.unique(self._view[among])
+        views = random.choice(allowed, min(_VIEWS, known))
+        lights = max(1, min(count, len(self._data.directions)) // len(views))
+        return np.stack([random.choice(self._of_view[view], lights) for view in views])
 
     def rows(
         self,

@@ -45,11 +45,20 @@ class TrainingData:
     """(N, 4) the decoder's inputs."""
     start: NDArray[np.float32]
     """(k, 8) the warm start `pca`."""
+    ids: NDArray[np.integer]
+    """(M,) which latent vector each texel has."""
+    size: tuple[int, int]
+    """Rows and columns of texels."""
 
     @property
     def latent_count(self) -> int:
         """k, the number of latent vectors."""
         return len(self.start)
+
+    @property
+    def is_textured(self) -> bool:
+        """Whether every texel has latents of its own, so that they are a texture."""
+        return len(self.start) == self.size[0] * self.size[1]
 
 
 def training_targets(
@@ -75,9 +84,10 @@ def training_data(
     clusters: AbrdfClusters,
     scale: AbrdfScale,
     directions: NDArray[np.float32],
+    size: tuple[int, int],
     plan: TrainingPlan,
 ) -> TrainingData:
-    """All that a plan needs of a BTF.
+    """All that a plan needs of a BTF of ``size`` (rows, columns).
 
     The pool has the ABRDFs of all texels; directions (N, 4) are `decoder_arrays.direction_inputs`.
     """
@@ -87,4 +97,6 @@ def training_data(
         scale,
         directions,
         clusters.start,
+        clusters.ids,
+        size,
     )

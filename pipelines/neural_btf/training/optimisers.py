@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
@@ -12,25 +12,48 @@ from pipelines.neural_btf.network import Decoder, Encoder
 from pipelines.neural_btf.training.plan import StageName
 
 _ENCODER_RATE = 2e-3
+_PARALLAX_RATE = 3.0
+"""Of the plan's rate: parallax is in texels."""
 _WARM_UP = 0.05
 """Share of a stage's steps on which the rate rises."""
 
 
 def stage_optimisers(
-    stage: StageName, encoder: Encoder, decoder: Decoder, latents: Tensor, rate: float
+    stage: StageName,
+    encoder: Encoder,
+    decoder: Decoder,
+    texture: tuple[Tensor, Tensor],
+    rate: float,
 ) -> list[torch.optim.Optimizer]:
-    """The optimisers of what a stage trains; ``rate`` is the plan's."""
+    """The optimisers of what a stage trains; ``texture``: latents and parallax."""
     of_encoder, of_decoder = list(encoder.parameters()), list(decoder.parameters())
     if stage == "paper":
         return [torch.optim.SGD([*of_encoder, *of_decoder], lr=rate)]
     if stage == "encoder":
-        return [_adam([*of_encoder, *of_decoder], _ENCODER_RATE)]
+        return [adam([*of_encoder, *of_decoder], _ENCODER_RATE)]
     if stage == "distil":
-        return [_adam(of_encoder, _ENCODER_RATE)]
-    hidden = [decoder.second.weight, decoder.third.weight]
-    others = [part for part in of_decoder if all(part is not matrix for matrix in hidden)]
+        return [adam(of_encoder, _ENCODER_RATE)]
+    latents, parallax = texture
+    weights = {
+        f"{kind}_{number}": getattr(layer, kind)
+        for number, layer in enumerate(decoder.layers, start=1)
+        for kind in ("weight", "bias")
+    }
+    return decoder_optimisers(weights, [latents], parallax, rate)
+
+
+def decoder_optimisers(
+    weights: Mapping[str, Tensor], latents: Sequence[Tensor], parallax: Tensor, rate: float
+) -> list[torch.optim.Optimizer]:
+    """Muon for the hidden layers, Adam for the others, for latents and for parallax.
+
+    ``weights``: ``weight_1``, ``bias_1`` … of the decoder.
+    """
+    hidden = [weights["weight_2"], weights["weight_3"]]
+    others = [part for part in weights.values() if all(part is not matrix for matrix in hidden)]
     return [
-        _adam([*others, latents], rate),
+        adam([*others, *latents], rate),
+        adam([parallax], _PARALLAX_RATE * rate),
         torch.optim.Muon(hidden, lr=rate, weight_decay=0.0),
     ]
 
@@ -47,5 +70,6 @@ def rate_share(stage: StageName, fraction: float) -> float:
     return max(1e-3, rising * 0.5 * (1.0 + math.cos(math.pi * falling)))
 
 
-def _adam(parameters: Sequence[Tensor], rate: float) -> torch.optim.Optimizer:
+def adam(parameters: Sequence[Tensor], rate: float) -> torch.optim.Optimizer:
+    """Adam as all stages but the paper's use it."""
     return torch.optim.Adam(parameters, lr=rate, betas=(0.9, 0.99), fused=True)

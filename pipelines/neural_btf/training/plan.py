@@ -48,6 +48,8 @@ class TrainingPlan:
     """Share of the steps that train latents through the encoder, for the warm start `encoder`."""
     encoder_steps: int = 0
     """Steps of fitting the encoder to the latents at the end of `fast`."""
+    parallax: bool = True
+    """Whether `fast` looks latents up beside a texel, by the view, where each texel has its own."""
     targets: Targets = "texels"
     """What `paper` fits: every texel, or its cluster's representative (unsaid)."""
     seed: int = 0
@@ -63,3 +65,17 @@ class TrainingPlan:
             Stage("distil", self.encoder_steps),
         ]
         return [stage for stage in planned if stage.steps > 0]
+
+
+@dataclass(frozen=True)
+class FineTuningPlan:
+    """How a trained network is trained on, knowing that it is rounded (`fine_tuning`)."""
+
+    bits: float = 3.9
+    """Mean bits that a number of decoder and latents may take in the file."""
+    steps: int = 250
+    rate: float = 0.003
+    """Largest learning rate of the cycle."""
+    batch_texels: int = 64
+    batch_images: int = 128
+    seed: int = 0

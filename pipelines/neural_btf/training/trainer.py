@@ -13,9 +13,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from pipelines.neural_btf.latent_texture import MONOMIALS
 from pipelines.neural_btf.network import Decoder, Encoder, default_widths, device
 from pipelines.neural_btf.training.batches import Batch, Batches
 from pipelines.neural_btf.training.data import TrainingData
+from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
 from pipelines.neural_btf.training.optimisers import rate_share, stage_optimisers
 from pipelines.neural_btf.training.plan import StageName, TrainingPlan
 
@@ -32,6 +34,8 @@ class TrainedNetwork(NamedTuple):
     decoder: Decoder
     latents: NDArray[np.float32]
     """(k, 8)."""
+    parallax: NDArray[np.float32] | None
+    """(9, 2) as `compressed.CompressedBtf` has it; None where latents are no texture."""
     curve_step: NDArray[np.int64]
     curve_rmse: NDArray[np.float64]
     """Root of the mean loss since the point before, at these steps; values are over alpha."""
@@ -85,6 +89,8 @@ class Trainer:
             random = np.random.default_rng((plan.seed, 9))
             first = random.standard_normal(data.start.shape).astype(np.float32)
         self.latents = torch.from_numpy(first.copy()).to(self._device).requires_grad_()
+        self.parallax = torch.zeros(MONOMIALS, 2, device=self._device, requires_grad=True)
+        self._textured = plan.training == "fast" and plan.parallax and data.is_textured
         self._directions = torch.from_numpy(data.directions).to(self._device)
         self._batches = Batches(data)
         self.stages = plan.stages()
@@ -134,6 +140,7 @@ class Trainer:
             self.encoder.eval().cpu(),
             self.decoder.eval().cpu(),
             latents,
+            self.parallax.detach().cpu().numpy().copy() if self._textured else None,
             steps,
             values,
             residual,
@@ -148,14 +155,14 @@ class Trainer:
         self._losses_of: dict[StageName, Callable[[np.random.Generator], Tensor]] = {
             "paper": self._paper_loss,
             "encoder": self._encoder_loss,
-            "latents": self._latents_loss,
+            "latents": self._texture_loss if self._textured else self._latents_loss,
             "distil": self._distil_loss,
         }
         self._optimisers = stage_optimisers(
             self.stages[self._stage].name,
             self.encoder,
             self.decoder,
-            self.latents,
+            (self.latents, self.parallax),
             self._plan.rate,
         )
         self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
@@ -203,6 +210,17 @@ class Trainer:
         owners = torch.from_numpy(batch.owners).to(self._device)
         with self._autocast():
             colours = self.decoder.grid(self.latents[owners], self._directions[images])
+        return self._error(colours, batch.values)
+
+    def _texture_loss(self, random: np.random.Generator) -> Tensor:
+        images = self._batches.images_by_view(random, self._plan.batch_images)
+        batch = self._rows(random, self._plan.batch_texels, images.ravel())
+        texels = torch.from_numpy(batch.owners).to(self._device)
+        views = self._directions[images[:, 0], 2:]
+        offsets = parallax_offsets(self.parallax, views)
+        latents = latents_beside(self.latents, self._data.size, texels, offsets)
+        with self._autocast():
+            colours = self.decoder.grid_by_view(latents, self._directions[images])
         return self._error(colours, batch.values)
 
     def _distil_loss(self, random: np.random.Generator) -> Tensor:
@@ -266,6 +284,7 @@ class Trainer:
                 "encoder": self.encoder.state_dict(),
                 "decoder": self.decoder.state_dict(),
                 "latents": self.latents.detach(),
+                "parallax": self.parallax.detach(),
                 "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
                 "position": [self._stage, self._step_in_stage, self.steps_done],
                 "curve": self._curve,
@@ -284,6 +303,7 @@ class Trainer:
         self.decoder.load_state_dict(saved["decoder"])
         with torch.no_grad():
             self.latents.copy_(saved["latents"])
+            self.parallax.copy_(saved["parallax"])
         for optimiser, state in zip(self._optimisers, saved["optimisers"], strict=True):
             optimiser.load_state_dict(state)
         self._curve = [(int(step), float(value)) for step, value in saved["curve"]]

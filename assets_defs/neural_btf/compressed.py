@@ -1,0 +1,203 @@
+"""What is kept of a trained network: `compressed_btf`, one file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from pydantic import Field
+
+from assets_defs.checks import Check
+from assets_defs.neural_btf.datasets import (
+    abrdf_reader,
+    btf_file_of,
+    compressed_btf_dataset,
+    compressed_btf_of,
+    float_btf_file,
+    pairs_of,
+    quantised_btf_file,
+    runtime_btf,
+    trained_network_of,
+)
+from assets_defs.neural_btf.declaration import BTF
+from assets_defs.neural_btf.network import stored_training_data
+from assets_defs.settings import Preset, Settings
+from assets_defs.system import Pictures, Progress, Result
+from pipelines.neural_btf import figures, file_figures
+from pipelines.neural_btf.decoder_arrays import direction_inputs
+from pipelines.neural_btf.training.plan import FineTuningPlan, TrainingPlan
+from storage.btf_file import Quantised, read_texel, write_btf_file
+from storage.schemas import neural_btf as schemas
+from storage.stored_version import StoredVersion
+from storage.work_state import WorkState
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipelines.neural_btf.training.fine_tuning import QuantisedNetwork
+
+_MIP_BYTES = 2 << 30
+_TEXELS = 32
+"""Read one by one."""
+
+
+class FileSettings(Settings):
+    """How a network becomes a file."""
+
+    form: Literal["quantised", "float32"] = Field(
+        "quantised", description="quantised: trained on, knowing it; float32: the paper's, as it is"
+    )
+    bits: float = Field(
+        3.9, gt=0.5, le=16.0, description="Quantised: mean bits a number of decoder and latents"
+    )
+    file_steps: int = Field(150, ge=1, description="Quantised: steps of gradient descent")
+    file_rate: float = Field(0.003, gt=0.0, le=1.0, description="Quantised: learning rate")
+    file_seed: int = Field(0, ge=0, description="Quantised: seed of its batches")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"file_steps": 60},
+        "paper": {"file_steps": 12_000},
+    }
+
+
+# ---- checks ----------------------------------------------------------------------------------
+
+
+def _size_ratio(version: StoredVersion) -> float:
+    btf = btf_file_of(version.dataset)
+    clusters = len(btf.latents.symbols if isinstance(btf.latents, Quantised) else btf.latents)
+    table = figures.table_bytes(clusters, btf.height * btf.width)
+    return version.dataset.sizes["byte"] / table
+
+
+def _random_access_mismatches(version: StoredVersion) -> float:
+    import numpy as np
+
+    btf, data = btf_file_of(version.dataset), version.dataset["file"].values.tobytes()
+    whole = btf.latents.symbols if isinstance(btf.latents, Quantised) else btf.latents
+    owners = np.arange(btf.height * btf.width) if btf.ids is None else btf.ids
+    texels = np.unique(np.linspace(0, len(owners) - 1, _TEXELS).astype(int))
+    found = [read_texel(data, 0, *divmod(int(texel), btf.width)) for texel in texels]
+    return float(np.any(np.array(found) != whole[owners[texels]], axis=1).sum())
+
+
+def _rmse_over_network(version: StoredVersion) -> float:
+    matrix = version.input("abrdf_matrix")
+    network = runtime_btf(
+        float_btf_file(version.input("neural_btf"), version.input("abrdf_clusters"), matrix)
+    )
+    return file_figures.rmse_ratio(
+        compressed_btf_of(version.dataset),
+        network,
+        abrdf_reader(matrix),
+        direction_inputs(pairs_of(matrix)),
+    )
+
+
+def _curve_pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.neural_btf.pictures import loss_curve
+
+    if "curve_step" not in dataset:
+        return {}
+    return {"loss": loss_curve(dataset["curve_step"].values, dataset["curve_rmse"].values)}
+
+
+# ---- compressed_btf --------------------------------------------------------------------------
+
+
+def fine_tuning_plan(settings: FileSettings) -> FineTuningPlan:
+    """The plan that the settings describe."""
+    return FineTuningPlan(
+        bits=settings.bits,
+        steps=settings.file_steps,
+        rate=settings.file_rate,
+        seed=settings.file_seed,
+    )
+
+
+def quantised_network(
+    settings: FileSettings,
+    work: WorkState,
+    progress: Progress,
+    abrdf_matrix: xr.Dataset,
+    abrdf_clusters: xr.Dataset,
+    neural_btf: xr.Dataset,
+) -> QuantisedNetwork:
+    """Train a stored network on, rounded; a run that was killed goes on where it was."""
+    import numpy as np
+
+    from pipelines.neural_btf.mips import averaged_abrdfs
+    from pipelines.neural_btf.training.fine_tuning import fine_tune
+
+    data = stored_training_data(TrainingPlan(), abrdf_matrix, abrdf_clusters)
+    views = np.unique(data.directions[:, 2:], axis=0, return_inverse=True)[1].ravel()
+    coarse = averaged_abrdfs(abrdf_reader(abrdf_matrix), data.size, views, budget=_MIP_BYTES)
+
+    def file_bytes(network: QuantisedNetwork) -> int:
+        return len(write_btf_file(quantised_btf_file(network, abrdf_clusters, abrdf_matrix)))
+
+    with work.alone():
+        return fine_tune(
+            data,
+            trained_network_of(neural_btf, len(data.directions)),
+            coarse,
+            fine_tuning_plan(settings),
+            file_bytes,
+            resume=work.read(),
+            keep=work.keep,
+            progress=progress,
+        )
+
+
+@BTF.asset(
+    schemas.COMPRESSED_BTF,
+    by=("material", "clusters"),
+    settings=FileSettings,
+    inputs=("abrdf_matrix", "abrdf_clusters", "neural_btf"),
+    kinds=frozenset({"zarr", "pytorch"}),
+    pictures=_curve_pictures,
+    checks=(
+        Check(
+            "size_ratio",
+            "Bytes of the whole file over decoder, latents and index list of the paper's table 1.",
+            _size_ratio,
+            at_most=1.02,
+            change=0.01,
+        ),
+        Check(
+            "rmse_over_network",
+            "RMSE of texels and pairs over that of the float network that it was made from.",
+            _rmse_over_network,
+            at_most=1.1,
+            change=0.02,
+        ),
+        Check(
+            "random_access_mismatches",
+            "Texels whose latents, read by themselves, are not those of the whole file.",
+            _random_access_mismatches,
+            at_most=0.0,
+        ),
+    ),
+)
+def compressed_btf(
+    settings: FileSettings,
+    progress: Progress,
+    work: WorkState,
+    abrdf_matrix: xr.Dataset,
+    abrdf_clusters: xr.Dataset,
+    neural_btf: xr.Dataset,
+) -> Result:
+    """Train decoder and latents to be rounded, and write the file that is needed at run time."""
+    inputs = abrdf_matrix, abrdf_clusters, neural_btf
+    if settings.form == "float32":
+        dataset = compressed_btf_dataset(float_btf_file(neural_btf, abrdf_clusters, abrdf_matrix))
+    else:
+        network = quantised_network(settings, work, progress, *inputs)
+        btf = quantised_btf_file(network, abrdf_clusters, abrdf_matrix)
+        dataset = compressed_btf_dataset(btf, (network.curve_step, network.curve_rmse))
+    values, stored = abrdf_matrix["abrdfs"].size, dataset.sizes["byte"]
+    return dataset, {
+        "file bytes": stored,
+        "ratio to float32": values * 4 / stored,
+        "ratio to 8 bit": values / stored,
+    }

@@ -1,0 +1,319 @@
+"""Training that knows its quantisation: what goes on from a trained network to the file.
+
+Decoder and latents are rounded in every step (`quantiser`), and coarser levels of latents are
+trained beside the finest against averaged ABRDFs (`mips`). The loss is the squared error plus a
+price on bits. The price is no setting: it rises while the file is larger than wanted and falls
+while it is smaller, so that each channel and layer gets as many bits as it is worth.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn.utils import parametrize
+
+from pipelines.neural_btf.latent_texture import averaged, level_sizes
+from pipelines.neural_btf.mips import AveragedAbrdfs
+from pipelines.neural_btf.network import Decoder, decoder_arrays, decoder_of, device
+from pipelines.neural_btf.training.batches import Batches
+from pipelines.neural_btf.training.data import TrainingData
+from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
+from pipelines.neural_btf.training.optimisers import adam, decoder_optimisers, rate_share
+from pipelines.neural_btf.training.plan import FineTuningPlan
+from pipelines.neural_btf.training.quantiser import Quantiser
+from pipelines.neural_btf.training.trainer import KEEP_SECONDS, TrainedNetwork
+
+_FIRST_STEPS = {"weight": 0.08, "bias": 0.02, "latents": 0.2, "mips": 0.3}
+"""Steps of quantisation at first, in standard deviations."""
+_STEP_RATE = 0.01
+_PRICE_RATE = 0.02
+_FIRST_PRICE = 3e-10
+_MIP_TEXELS = 32
+_MIP_WEIGHT = 4.0
+"""Errors of means are smaller than those of texels, and should stay so."""
+_ASK_EVERY = 50
+"""Steps between questions for the file's true bytes."""
+
+
+class QuantisedNetwork(NamedTuple):
+    """A network in whole numbers; values are symbols times steps."""
+
+    decoder: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
+    """Symbols and step () of ``weight_1``, ``bias_1`` …"""
+    latents: NDArray[np.int32]
+    """(k, 8)."""
+    latent_steps: NDArray[np.float32]
+    """(8,)."""
+    mips: tuple[NDArray[np.int32], ...]
+    """Coarser levels, each (texel, 8)."""
+    mip_steps: NDArray[np.float32]
+    """(8,)."""
+    parallax: NDArray[np.float32] | None
+    """(9, 2)."""
+    curve_step: NDArray[np.int64]
+    curve_rmse: NDArray[np.float64]
+    """Root of the mean squared error since the point before, values over alpha."""
+
+
+def fine_tune(
+    data: TrainingData,
+    trained: TrainedNetwork,
+    coarse: AveragedAbrdfs,
+    plan: FineTuningPlan,
+    file_bytes: Callable[[QuantisedNetwork], int],
+    *,
+    resume: bytes | None = None,
+    keep: Callable[[bytes], None] = lambda state: None,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> QuantisedNetwork:
+    """Quantise a trained network of the same data, and train it on.
+
+    ``file_bytes`` tells how large a network's file is: asked for now and then. ``keep`` gets the
+    state every 15 seconds; ``resume`` is such a state.
+    """
+    tuning = FineTuning(data, trained, coarse, plan, file_bytes)
+    if resume is not None:
+        tuning.restore(resume)
+    kept = time.monotonic()
+    while tuning.steps_done < plan.steps:
+        tuning.step()
+        if time.monotonic() - kept > KEEP_SECONDS:
+            keep(tuning.state())
+            kept = time.monotonic()
+        if tuning.steps_done % 20 == 0:
+            progress(tuning.steps_done / plan.steps)
+    return tuning.result()
+
+
+class FineTuning:
+    """One run, step by step."""
+
+    def __init__(
+        self,
+        data: TrainingData,
+        trained: TrainedNetwork,
+        coarse: AveragedAbrdfs,
+        plan: FineTuningPlan,
+        file_bytes: Callable[[QuantisedNetwork], int],
+    ) -> None:
+        torch.manual_seed(plan.seed)
+        self._data, self._coarse, self._plan, self._file_bytes = data, coarse, plan, file_bytes
+        self._device = device()
+        self._batches = Batches(data)
+        self._directions = torch.from_numpy(data.directions).to(self._device)
+        self._sizes = level_sizes(*data.size)[1:]
+        self._has_parallax = trained.parallax is not None
+        self.decoder = _quantised_decoder(decoder_of(decoder_arrays(trained.decoder)))
+        self.decoder.to(self._device).train()
+        parallax = np.zeros((9, 2), np.float32) if trained.parallax is None else trained.parallax
+        self.parallax = self._parameter(parallax)
+        self.latents = self._parameter(trained.latents)
+        self.mips = self._parameter(_coarse_latents(trained.latents, data))
+        self.of_latents = self._quantiser(self.latents, "latents")
+        self.of_mips = self._quantiser(self.mips, "mips")
+        weights = {name: part for name, (_, part) in _quantised_parts(self.decoder).items()}
+        self._optimisers = [
+            *decoder_optimisers(weights, [self.latents, self.mips], self.parallax, plan.rate),
+            adam(self._log_steps(), _STEP_RATE),
+        ]
+        self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
+        self.steps_done = 0
+        self._price, self._true_share = _FIRST_PRICE, 1.0
+        self._curve: list[tuple[int, float]] = []
+        self._squares, self._count = 0.0, 0
+        numbers = sum(part.numel() for part in (*weights.values(), self.latents, self.mips))
+        self.wanted_bytes = plan.bits * numbers / 8
+
+    # ---- a step ------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """One step of gradient descent, and one of the price."""
+        plan = self._plan
+        share = rate_share("latents", self.steps_done / plan.steps)
+        for optimiser, rate in zip(self._optimisers, self._rates, strict=True):
+            for group in optimiser.param_groups:
+                group["lr"] = rate * share
+        random = np.random.default_rng((plan.seed, 4, self.steps_done))
+        with parametrize.cached():
+            error = self._error(random)
+            loss = error + _MIP_WEIGHT * self._mip_error(random) if self._sizes else error
+            bits = self._bits()
+            loss = loss + self._price * bits
+            for optimiser in self._optimisers:
+                optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+        for optimiser in self._optimisers:
+            optimiser.step()
+        self._change_price(float(bits.detach()))
+        self.steps_done += 1
+        self._note(float(error.detach()))
+
+    def _change_price(self, bits: float) -> None:
+        """Dearer while the file is too large, cheaper while it is too small."""
+        if self.steps_done % _ASK_EVERY == 0:
+            self._true_share = self._file_bytes(self.result()) * 8 / bits
+        over = bits * self._true_share / (8 * self.wanted_bytes) - 1.0
+        self._price *= math.exp(_PRICE_RATE * max(-1.0, min(1.0, 10.0 * over)))
+
+    def _note(self, error: float) -> None:
+        self._squares += error
+        self._count += 1
+        if self.steps_done % max(1, self._plan.steps // 100) == 0:
+            self._curve.append((self.steps_done, math.sqrt(self._squares / self._count)))
+            self._squares, self._count = 0.0, 0
+
+    # ---- losses ------------------------------------------------------------------------------
+
+    def _error(self, random: np.random.Generator) -> Tensor:
+        """Mean squared error of the finest level on a batch, over alpha."""
+        images = self._batches.images_by_view(random, self._plan.batch_images)
+        batch = self._batches.rows(random, self.steps_done, self._plan.batch_texels, images.ravel())
+        owners = torch.from_numpy(batch.owners).to(self._device)
+        table = self.of_latents(self.latents)
+        if self._has_parallax:
+            offsets = parallax_offsets(self.parallax, self._directions[images[:, 0], 2:])
+            latents = latents_beside(table, self._data.size, owners, offsets)
+        else:
+            latents = table[owners][:, None].expand(-1, len(images), -1)
+        return self._difference(latents, images, batch.values)
+
+    def _mip_error(self, random: np.random.Generator) -> Tensor:
+        """The same of a coarser level, drawn: those of more texels more often."""
+        sizes = np.array([rows * columns for rows, columns in self._sizes])
+        level = int(random.choice(len(sizes), p=np.sqrt(sizes) / np.sqrt(sizes).sum()))
+        held = self._coarse.photographs
+        images = self._batches.images_by_view(random, self._plan.batch_images, among=held)
+        texels = random.integers(0, sizes[level], min(_MIP_TEXELS, sizes[level]))
+        first = int(sizes[:level].sum())
+        table = self.of_mips(self.mips)[first : first + sizes[level]]
+        offsets = parallax_offsets(self.parallax, self._directions[images[:, 0], 2:])
+        rows, columns = self._sizes[level]
+        scale = torch.tensor([columns / self._data.size[1], rows / self._data.size[0]])
+        where = torch.from_numpy(texels).to(self._device)
+        latents = latents_beside(table, (rows, columns), where, offsets * scale.to(self._device))
+        numbers = np.searchsorted(held, images.ravel())
+        values = self._coarse.levels[level][texels[:, None], numbers[None]]
+        return self._difference(latents, images, values)
+
+    def _difference(
+        self, latents: Tensor, images: NDArray[np.int64], values: NDArray[np.floating]
+    ) -> Tensor:
+        with torch.autocast(self._device.type, torch.bfloat16):
+            colours = self.decoder.grid_by_view(latents, self._directions[images])
+        wanted = torch.from_numpy(np.ascontiguousarray(values)).to(self._device).float()
+        return ((colours.float() - wanted / self._data.scale.alpha) ** 2).mean()
+
+    def _bits(self) -> Tensor:
+        total = self.of_latents.bits(self.latents) + self.of_mips.bits(self.mips)
+        for quantiser, original in _quantised_parts(self.decoder).values():
+            total = total + quantiser.bits(original)
+        return total
+
+    # ---- result ------------------------------------------------------------------------------
+
+    def result(self) -> QuantisedNetwork:
+        """What has been learnt so far, in whole numbers."""
+        symbols = self.of_mips.symbols(self.mips)
+        ends = np.cumsum([rows * columns for rows, columns in self._sizes], dtype=np.int64)
+        return QuantisedNetwork(
+            {
+                name: (quantiser.symbols(original), quantiser.steps().reshape(()))
+                for name, (quantiser, original) in _quantised_parts(self.decoder).items()
+            },
+            self.of_latents.symbols(self.latents),
+            self.of_latents.steps(),
+            tuple(np.split(symbols, ends[:-1])) if self._sizes else (),
+            self.of_mips.steps(),
+            self.parallax.detach().cpu().numpy().copy() if self._has_parallax else None,
+            np.array([step for step, _ in self._curve], np.int64),
+            np.array([value for _, value in self._curve], np.float64),
+        )
+
+    # ---- stopping and resuming ---------------------------------------------------------------
+
+    def state(self) -> bytes:
+        """Everything that is needed to go on, as bytes."""
+        file = io.BytesIO()
+        torch.save(
+            {
+                "trained": {name: part.detach() for name, part in self._trained().items()},
+                "decoder": self.decoder.state_dict(),
+                "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
+                "position": [self.steps_done, self._count],
+                "price": [self._price, self._true_share, self._squares],
+                "curve": self._curve,
+            },
+            file,
+        )
+        return file.getvalue()
+
+    def restore(self, kept: bytes) -> None:
+        """Go on from a state of the same data, network and plan."""
+        saved = torch.load(io.BytesIO(kept), map_location=self._device, weights_only=True)
+        self.decoder.load_state_dict(saved["decoder"])
+        with torch.no_grad():
+            for name, part in self._trained().items():
+                part.copy_(saved["trained"][name])
+        for optimiser, state in zip(self._optimisers, saved["optimisers"], strict=True):
+            optimiser.load_state_dict(state)
+        self.steps_done, self._count = saved["position"]
+        self._price, self._true_share, self._squares = saved["price"]
+        self._curve = [(int(step), float(value)) for step, value in saved["curve"]]
+
+    def _trained(self) -> dict[str, Tensor]:
+        return {
+            "latents": self.latents,
+            "mips": self.mips,
+            "parallax": self.parallax,
+            "latent steps": self.of_latents.log_step,
+            "mip steps": self.of_mips.log_step,
+        }
+
+    # ---- making ------------------------------------------------------------------------------
+
+    def _parameter(self, values: NDArray[np.float32]) -> Tensor:
+        return torch.from_numpy(values.copy()).to(self._device).requires_grad_()
+
+    def _quantiser(self, values: Tensor, kind: str) -> Quantiser:
+        return Quantiser(values, _FIRST_STEPS[kind], by_channel=True).to(self._device)
+
+    def _log_steps(self) -> list[nn.Parameter]:
+        parts = [quantiser for quantiser, _ in _quantised_parts(self.decoder).values()]
+        return [part.log_step for part in (*parts, self.of_latents, self.of_mips)]
+
+
+def _quantised_decoder(decoder: Decoder) -> Decoder:
+    """The decoder with weights and biases that are rounded whenever they are used."""
+    for layer in decoder.layers:
+        for name in ("weight", "bias"):
+            first = Quantiser(getattr(layer, name), _FIRST_STEPS[name], by_channel=False)
+            parametrize.register_parametrization(layer, name, first)
+    return decoder
+
+
+def _quantised_parts(decoder: Decoder) -> dict[str, tuple[Quantiser, Tensor]]:
+    """Quantiser and unrounded values of ``weight_1``, ``bias_1`` …"""
+    parts = {}
+    for number, layer in enumerate(decoder.layers, start=1):
+        for name in ("weight", "bias"):
+            entry: Any = layer.get_submodule(f"parametrizations.{name}")
+            parts[f"{name}_{number}"] = (entry[0], entry.original)
+    return parts
+
+
+def _coarse_latents(latents: NDArray[np.float32], data: TrainingData) -> NDArray[np.float32]:
+    """Latents of all coarser levels in one table, each the mean of what it covers.
+
+    A single texel has no coarser levels; it is given one row that nothing uses.
+    """
+    texture = latents[data.ids]
+    sizes = level_sizes(*data.size)[1:] or [(1, 1)]
+    return np.concatenate([averaged(texture, data.size, size) for size in sizes])
