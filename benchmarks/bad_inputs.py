@@ -57,8 +57,8 @@ def _read_btf(path: Path) -> None:
 
 def _read_btf_file(path: Path) -> None:
     data = path.read_bytes()
-    with contextlib.suppress(IndexError, BadInput):  # without the checksum
-        read_texel(data, 0, 1, 1, path.name)
+    with contextlib.suppress(BadInput):  # it does not look at the checksum
+        read_texel(data, 0, 0, 0, path.name)
     read_btf_file(data, path.name)
 
 

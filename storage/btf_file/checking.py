@@ -44,8 +44,8 @@ def check_contents(btf: BtfFile) -> None:
 
 def _check_numbers(btf: BtfFile) -> None:
     numbers = np.array([btf.alpha, btf.least, btf.largest], np.float32)
-    if not (np.isfinite(numbers).all() and numbers[0] > 0 and numbers[1] <= numbers[2]):
-        _refuse("alpha, least, largest", f"{numbers.tolist()}", "finite ones, in order")
+    if not (0 < numbers[0] < math.inf and numbers[1] <= numbers[2]):
+        _refuse("alpha, least, largest", f"{numbers.tolist()}", "above 0, and two in order")
     parallax = btf.parallax
     if parallax is not None and (parallax.shape != (9, 2) or not np.isfinite(parallax).all()):
         _refuse("parallax", f"{parallax.shape}, or not finite", "(9, 2) finite numbers")

@@ -75,8 +75,7 @@ class BtfFile:
     parallax: NDArray[np.float32] | None = None
     """(9, 2) coefficients of the offset (column, row) in texels by view."""
     least: float = 0.0
-    """Least decoded value, over alpha (float32)."""
+    """Decoded values, over alpha, are held to this and to `largest` (float32); may be infinite."""
     largest: float = 1.0
-    """Largest decoded value, over alpha (float32)."""
     student: Mapping[str, Tensor] = field(default_factory=dict)
     """A second, smaller decoder of the same latents; empty where there is none."""

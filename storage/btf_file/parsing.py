@@ -139,7 +139,9 @@ def _header(data: bytes, name: str, *, whole: bool) -> Header:
         side, layers, student, tables,
     ) = HEADER.unpack_from(data)  # fmt: skip
     if length != len(data):
-        raise BadInput(name, "length", f"{len(data)} bytes", f"{length}, as it says: {_AGAIN}")
+        raise BadInput(
+            name, "length", f"{len(data)} bytes", f"{length}, as its header says: {_AGAIN}"
+        )
     if whole and crc != layout.checksum(data):
         raise BadInput(name, "checksum", f"{layout.checksum(data):08x}", f"{crc:08x}: {_AGAIN}")
     known = {key: bool(flags & bit) for key, bit in layout.FLAGS.items()}
@@ -163,9 +165,9 @@ def _header(data: bytes, name: str, *, whole: bool) -> Header:
         raise BadInput(name, "side of a tile", f"{side}", "an even number")
     if not known["ids"] and vectors != height * width:
         raise BadInput(name, "latent vectors", f"{vectors}", f"{height * width}, one a texel")
-    if not (0 < alpha < math.inf and -math.inf < least <= largest < math.inf):
+    if not (0 < alpha < math.inf and least <= largest):
         found = f"{alpha:g}, {least:g}, {largest:g}"
-        raise BadInput(name, "alpha, least, largest", found, "finite ones, in order")
+        raise BadInput(name, "alpha, least, largest", found, "above 0, and two in order")
     if len(data) < HEADER.size + LAYER.size * (layers + student):
         raise BadInput(name, "layers", "cut", _AGAIN)
     decoder, second = (
