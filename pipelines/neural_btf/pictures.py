@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.contact_sheet import contact_sheet
+from pipelines.drawing.picture_metrics import flip_map
 from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.light.directions import Pairs, angles_between, unit_vectors
 
 _DIFFERENCE_TIMES = 4
+TEXELS_PER_DEGREE = 67.0 / 4
+"""Of sight, for FLIP: a texel is seen as large as four pixels of a screen."""
 _SHOWN_PAIRS = ((0, 0, 0, 0), (0, 0, 45, 90), (0, 0, 60, 0), (60, 0, 30, 180), (60, 90, 60, 90),
                 (75, 270, 75, 90))  # fmt: skip
 """View theta and phi, light theta and phi, in degrees: a look from above and from the side."""
@@ -50,28 +53,32 @@ def photograph_sheet(images: NDArray[np.floating]) -> NDArray[np.uint8]:
 def restored_picture(
     original: NDArray[np.floating], restored: NDArray[np.floating], pairs: Pairs
 ) -> NDArray[np.uint8]:
-    """Rows of original, restored, difference (x 4) for photographs (pair, y, x, 3).
+    """Rows of original, restored, difference (x 4), FLIP for photographs (pair, y, x, 3).
 
-    A row has one exposure, from the original; the difference is absolute, as brightness.
+    A row has one exposure, from the original; the difference is absolute, as brightness; FLIP, what
+    an eye notices of it, goes from black, nothing, to white, all (1).
     """
-    figure, canvas = new_figure(8.4, 2.9 * len(original))
-    axes = figure.subplots(len(original), 3, squeeze=False)
+    figure, canvas = new_figure(11.2, 2.9 * len(original))
+    axes = figure.subplots(len(original), 4, squeeze=False)
     for row, (measured, given, light, view) in enumerate(
         zip(original, restored, pairs.light, pairs.view, strict=True)
     ):
         scale = auto_exposure(measured)
         rmse = float(np.sqrt(np.mean((given - measured) ** 2)))
         difference = np.abs(given - measured) * scale * _DIFFERENCE_TIMES
-        for axis, picture, title in (
-            (axes[row, 0], to_8bit(measured * scale), f"measured: view {_words(view)}"),
-            (axes[row, 1], to_8bit(given * scale), f"restored: light {_words(light)}"),
+        truth, picture = to_8bit(measured * scale), to_8bit(given * scale)
+        flip = flip_map(picture, truth, TEXELS_PER_DEGREE)
+        for axis, shown, title in (
+            (axes[row, 0], truth, f"measured: view {_words(view)}"),
+            (axes[row, 1], picture, f"restored: light {_words(light)}"),
             (
                 axes[row, 2],
                 to_8bit(difference),
                 f"|difference| x {_DIFFERENCE_TIMES}, RMSE {rmse:.3f}",
             ),
+            (axes[row, 3], flip, f"FLIP, mean {flip.mean():.3f}"),
         ):
-            axis.imshow(picture, interpolation="nearest")
+            axis.imshow(shown, interpolation="nearest", cmap="magma", vmin=0.0, vmax=1.0)
             axis.set_title(title, fontsize=9)
             axis.set_axis_off()
     return canvas_picture(canvas)

@@ -46,7 +46,7 @@ from pipelines.drawing.picture_metrics import (
 )
 from pipelines.light.directions import Pairs
 from pipelines.neural_btf.abrdf_pool import AbrdfReader
-from pipelines.neural_btf.pictures import nearest_images
+from pipelines.neural_btf.pictures import TEXELS_PER_DEGREE, nearest_images
 from pipelines.neural_btf.quality_sums import GRAZING, Comparison, compare
 
 _Photographs = NDArray[np.float32]
@@ -54,8 +54,6 @@ _Photographs = NDArray[np.float32]
 _JUDGED_VIEWS = ((0, 0), (15, 60), (30, 150), (45, 240), (60, 324), (75, 45))
 _JUDGED_LIGHTS = ((15, 0), (45, 90), (60, 180), (75, 270))
 """Degrees: theta, and phi from the view's: from behind the camera, from the side, against it."""
-TEXELS_PER_DEGREE = 67.0 / 4
-"""Of sight, for FLIP: a texel is seen as large as four pixels."""
 _WORST = 0.1
 _LEAST_CONTRAST = 0.1
 """Of the deviation of all values: photographs of less contrast are judged as if they had it."""

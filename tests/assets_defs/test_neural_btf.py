@@ -230,6 +230,16 @@ def _next_cluster(right: Callable[..., Any], self: Any, texels: Any) -> Any:
     return found if self.ids is None else np.roll(found, 1, axis=0)
 
 
+def _mean_colours(right: Callable[..., Any], *arguments: Any) -> Any:
+    """The mean ABRDF for every texel: no texel differs from the next."""
+    found = right(*arguments)
+    return np.broadcast_to(found.mean(axis=0), found.shape).copy()
+
+
+def _next_texels(right: Callable[..., Any], *arguments: Any) -> Any:
+    return np.random.default_rng(0).permutation(right(*arguments))
+
+
 def _tiny_panel(right: Callable[..., Any], *arguments: Any) -> Any:
     made = right(*arguments)
     return made._replace(vertices=made.vertices * 0.3)
@@ -280,8 +290,10 @@ REGRESSIONS = (
     Regression("decoding_error", network_assets, "packed_btf", _scaled_weights, WITHOUT),
     Regression("rmse", restoration, "direction_inputs", _swapped_directions, WITHOUT),
     Regression("rmse_over_none", compressed.CompressedBtf, "latents_of", _next_cluster, CLUSTERED),
-    Regression("worst_image", restoration, "direction_inputs", _swapped_directions, WITHOUT),
-    Regression("worst_texel", restoration, "direction_inputs", _swapped_directions, WITHOUT),
+    Regression("rmse_over_null", compressed.CompressedBtf, "abrdfs", _mean_colours, WITHOUT),
+    Regression("worst_photographs", restoration, "direction_inputs", _swapped_directions, WITHOUT),
+    Regression("worst_texels", compressed.CompressedBtf, "abrdfs", _mean_colours, CLUSTERED),
+    Regression("grazing_detail", compressed.CompressedBtf, "abrdfs", _next_texels, CLUSTERED),
     Regression("coverage", panel, "folded_panel", _tiny_panel, WITHOUT),
     Regression(
         "mean_brightness", panel, "to_8bit", lambda right, picture: right(picture * 0.7), WITHOUT
