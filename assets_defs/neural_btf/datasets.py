@@ -355,7 +355,7 @@ def cloth_frames_dataset(frames: ClothFrames) -> xr.Dataset:
             "closeup": ((*_PIXELS, "channel"), frames.closeup),
             "camera_azimuth": ("frame", CAMERA_AZIMUTH + turns),
             "sun_azimuth": ("frame", SUN_AZIMUTH + turns),
-            "compared": (("shot", "material", "small_y", "small_x", "channel"), frames.compared),
+            "compared": (("material", "small_y", "small_x", "channel"), frames.compared),
         }
     )
 

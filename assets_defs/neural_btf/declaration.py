@@ -34,7 +34,7 @@ def _material_walls(store: VersionedStore, slots: Sequence[Slot]) -> Pictures:
     for slot in slots:
         if slot.system == BTF.name and slot.asset == "cloth_frames":
             clusters = slot.partition.partition(".")[0]
-            found.setdefault(clusters, []).append(store.open(slot)["frames"].values)
+            found.setdefault(clusters, []).append(store.open(slot)["moving_light"].values)
     return {
         f"wall-{clusters}": material_wall(panels)
         for clusters, panels in found.items()

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipelines.light.directions import all_pairs, hemisphere_table
 from pipelines.neural_btf.compression import TrainingPlan, compress_photographs
-from pipelines.neural_btf.panel import draw_frames, moving_lights
+from pipelines.neural_btf.draping.frames import Shots, draw_frames
 from pipelines.virtual.cloth.gonioreflectometer import Gonioreflectometer
 from pipelines.virtual.cloth.weaves import make_cloth
 
@@ -23,10 +23,12 @@ gonio = Gonioreflectometer(make_cloth("corduroy", seed=0), directions, (24, 24),
 photographs = np.concatenate([gonio.photographs(view) for view in directions])
 
 # %% [markdown]
-# The network, and a folded panel of the cloth decoded from it.
+# The network, and a draped cloth decoded from it, close by.
 
 # %%
 plan = TrainingPlan(steps=100, rate=0.02, batch_texels=32, batch_images=16)
-btf = compress_photographs(photographs, all_pairs(directions, directions), plan=plan)
-plt.imshow(draw_frames(btf, moving_lights(1)).pictures[0])
+pairs = all_pairs(directions, directions)
+btf = compress_photographs(photographs, pairs, plan=plan)
+shots = Shots(width=320, samples=8, frames=1, tiles=20)
+plt.imshow(draw_frames(btf, photographs, pairs, shots).closeup)
 plt.show()

@@ -14,7 +14,8 @@ method:
    ``abrdf_pool`` the part of the matrix that is in memory.
 4. ``compressed``: what is kept, and what it decodes to (``CompressedBtf``); ``restoration``: its
    errors against all photographs (``restoration_errors``).
-5. ``panel``: a folded panel of the material under a moving light (``draw_frames``).
+5. ``draping``: a draped cloth of the material under a sky (``draw_frames``); ``material``: what
+   else such a picture can be of; ``importance``: directions of light drawn as a material needs.
 
 ``orientation`` tells which way up photographs lie in their files, by the ``relief`` that they show.
 ``compression`` does steps 1 to 4 on photographs in memory by one call (``compress_photographs``).

@@ -233,9 +233,9 @@ CLOTH_FRAMES = Schema(
         "camera_azimuth": Variable(("frame",), "float64", "degree", "Of the orbit's camera"),
         "sun_azimuth": Variable(("frame",), "float64", "degree", "Of the moving light's sun"),
         "compared": Variable(
-            ("shot", "material", "small_y", "small_x", "channel"), "float32", "1",
-            "The orbit's first picture and the close-up, small, of the measured BTF and of its mean "
-            "colour: linear RGB, exposed as these are; NaN where the first has no cloth",
+            ("material", "small_y", "small_x", "channel"), "float32", "1",
+            "The close-up, small, of the compressed BTF, of the measured one and of its mean "
+            "colour: linear RGB, exposed as the close-up",
         ),
     },
 )  # fmt: skip

@@ -22,10 +22,10 @@ from pipelines.light import directions
 from pipelines.neural_btf import (
     clusters,
     compressed,
-    panel,
     principal_abrdfs,
     restoration,
 )
+from pipelines.neural_btf.draping import rendering
 from pipelines.neural_btf.training import batches
 from pipelines.neural_btf.training import trainer as training
 from pipelines.virtual.cloth import gonioreflectometer
@@ -240,9 +240,12 @@ def _next_texels(right: Callable[..., Any], *arguments: Any) -> Any:
     return np.random.default_rng(0).permutation(right(*arguments))
 
 
-def _tiny_panel(right: Callable[..., Any], *arguments: Any) -> Any:
-    made = right(*arguments)
-    return made._replace(vertices=made.vertices * 0.3)
+def _light_from_behind(
+    right: Callable[..., Any], material: Any, places: Any, light: Any, *more: Any
+) -> Any:
+    """Of the compressed BTF alone."""
+    is_wrong = isinstance(material, compressed.CompressedBtf)
+    return right(material, places, light * [-1, -1, 1] if is_wrong else light, *more)
 
 
 def _next_latents(right: Callable[..., Any], scenery: Any) -> Any:
@@ -294,10 +297,7 @@ REGRESSIONS = (
     Regression("worst_photographs", restoration, "direction_inputs", _swapped_directions, WITHOUT),
     Regression("worst_texels", compressed.CompressedBtf, "abrdfs", _mean_colours, CLUSTERED),
     Regression("grazing_detail", compressed.CompressedBtf, "abrdfs", _next_texels, CLUSTERED),
-    Regression("coverage", panel, "folded_panel", _tiny_panel, WITHOUT),
-    Regression(
-        "mean_brightness", panel, "to_8bit", lambda right, picture: right(picture * 0.7), WITHOUT
-    ),
+    Regression("closeup_over_flat", rendering, "surface_radiance", _light_from_behind, WITHOUT),
     Regression("mismatches", package_assets, "_values", _next_latents, CLUSTERED),
 )
 

@@ -24,7 +24,7 @@ from pipelines.neural_btf.clusters import (
 )
 from pipelines.neural_btf.compressed import CompressedBtf
 from pipelines.neural_btf.network import Decoder, Encoder, decoder_arrays, encoder_vector
-from pipelines.neural_btf.panel import Frames
+from pipelines.neural_btf.draping.frames import ClothFrames
 from pipelines.neural_btf.principal_abrdfs import AbrdfSummary, summarise_abrdfs
 from pipelines.neural_btf.restoration import restoration_errors
 from pipelines.neural_btf.training.trainer import TrainedNetwork
@@ -230,9 +230,10 @@ def test_restored_photographs_and_frames_fit_their_schemas(
         dataset["restored"].values, compressed.photographs(Pairs(*(p[shown] for p in PAIRS)))
     )
     np.testing.assert_array_equal(dataset["rmse_texel"].values.ravel(), errors.of_texel)
-    frames = Frames(np.zeros((2, 9, 12, 3), np.uint8), 0.5)
-    drawn = datasets.cloth_frames_dataset(frames, np.zeros((2, 2)))
-    assert float(schemas.CLOTH_FRAMES.conform(drawn)["coverage"]) == 0.5
+    pictures = np.zeros((2, 9, 12, 3), np.uint8)
+    frames = ClothFrames(pictures, pictures, pictures[0], np.zeros((3, 6, 8, 3), np.float32))
+    drawn = schemas.CLOTH_FRAMES.conform(datasets.cloth_frames_dataset(frames))
+    assert np.diff(drawn["sun_azimuth"]).tolist() == [180.0]
 
 
 # ---- tsuya.load ------------------------------------------------------------------------------

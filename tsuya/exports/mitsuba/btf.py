@@ -94,7 +94,7 @@ def write_btf_folder(
 
 def plug_in_arrays(btf: CompressedBtf) -> dict[str, Any]:
     """What `tsuya_btf.py` reads."""
-    from pipelines.neural_btf.light_shares import light_shares
+    from pipelines.neural_btf.importance import importance_table
 
     ids = np.arange(btf.texels) if btf.ids is None else btf.ids
     return {
@@ -102,5 +102,5 @@ def plug_in_arrays(btf: CompressedBtf) -> dict[str, Any]:
         "latents": btf.latents,
         "ids": ids.reshape(btf.height, btf.width).astype(np.int32),
         "alpha": np.float32(btf.alpha),
-        "shares": light_shares(btf),
+        "shares": importance_table(btf).shares,
     }
