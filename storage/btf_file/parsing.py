@@ -55,26 +55,16 @@ class ParsedFile:
         header = self.header
         return levels_of(header.height, header.width, header.coarser, header.side)
 
-    def streams(self, section: str, first: int, count: int) -> StreamDecoder:
-        """A decoder of ``count`` streams of a section, from the one numbered ``first`` there."""
-        return self.chosen_streams(section, np.arange(first, first + count))
-
-    def chosen_streams(self, section: str, numbers: Ints) -> StreamDecoder:
-        """A decoder of these streams of a section."""
+    def streams(self, section: str, numbers: Ints) -> StreamDecoder:
+        """A decoder of these streams of a section, which are numbered from 0 there."""
         where = self.sections[section]
         words = self.words[where.first_stream : where.first_stream + where.streams]
         starts = where.start + 4 * where.floats + 2 * (np.cumsum(words) - words)
-        lengths = words[numbers]
-        if len(numbers) and np.array_equal(numbers, np.arange(numbers[0], numbers[-1] + 1)):
-            start, count = int(starts[numbers[0]]), int(lengths.sum())
-            found = np.frombuffer(self.data, "<u2", count, start)
-        else:
-            parts = [
-                np.frombuffer(self.data, "<u2", int(lengths[n]), int(starts[number]))
-                for n, number in enumerate(numbers)
-            ]
-            found = np.concatenate(parts)
-        return StreamDecoder(found, lengths, self.tables)
+        parts = [
+            np.frombuffer(self.data, "<u2", count, start)
+            for count, start in zip(words[numbers].tolist(), starts[numbers].tolist(), strict=True)
+        ]
+        return StreamDecoder(np.concatenate(parts), words[numbers], self.tables)
 
     def floats(self, section: str) -> NDArray[np.float32]:
         """A section's float32 values; BadInput where one is not finite."""

@@ -110,7 +110,7 @@ def _quantised(layers: tuple[Layer, ...]) -> int:
 def _sequence(file: ParsedFile, section: str, tables: Ints, a_stream: int) -> NDArray[np.int32]:
     if not len(tables):
         return np.zeros(0, np.int32)
-    decoder = file.streams(section, 0, -(-len(tables) // a_stream))
+    decoder = file.streams(section, np.arange(-(-len(tables) // a_stream)))
     return _checked(file, section, decoder, decode_sequence(decoder, tables, a_stream))
 
 
@@ -153,7 +153,7 @@ def _vector(file: ParsedFile, number: int) -> NDArray[Any]:
     stream, place = divmod(number, header.side**2)
     vectors = min(header.side**2, header.vectors - stream * header.side**2)
     numbers = np.tile(file.channel_tables[0], vectors)
-    decoder = file.streams("latents", stream, 1)
+    decoder = file.streams("latents", np.array([stream]))
     found = decode_sequence(decoder, numbers, len(numbers)).reshape(-1, header.channels)
     return _checked(file, "latents", decoder, found)[place]
 
@@ -163,7 +163,7 @@ def _tiles(file: ParsedFile, level: int, tiles: Ints, coarser: Ints | None) -> I
     levels, group = file.levels, int(level > 0)
     before = sum(one.tiles for one in levels[1:level])
     section = "mips" if level else "latents"
-    decoder = file.chosen_streams(section, before + tiles)
+    decoder = file.streams(section, before + tiles)
     one = levels[level]
     parents = None if coarser is None else parents_of(one, tiles, levels[level + 1], coarser)
     found = decode_tiles(
