@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from assets_defs.neural_btf.datasets import compressed_btf_of
+from assets_defs.neural_btf.datasets import btf_file_of, runtime_btf
 from assets_defs.neural_btf.declaration import BTF, NONE
 from assets_defs.packages import PackageSettings, package_dataset, read_back_check
 from assets_defs.settings import Preset
 from assets_defs.system import Result
-from pipelines.neural_btf.decoder_arrays import DECODER_ARRAY_NAMES
 from pipelines.virtual.cloth.weaves import MATERIALS
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
     from pipelines.neural_btf.compressed import CompressedBtf
     from pipelines.neural_btf.live_parts import ReferenceView
     from pipelines.neural_btf.stage_view import Scenery
+    from storage.btf_file import BtfFile
+    from storage.btf_file.contents import Tensor
     from storage.packages import Figure, PaperFigure, Source, View
 
 _BUILT_IN = "Apache-2.0 (made by Tsuya)"
@@ -55,14 +56,8 @@ class BtfPackageSettings(PackageSettings):
 
 
 def _expected(version: StoredVersion) -> dict[str, Any]:
-    """Parts as the datasets have them."""
-    import numpy as np
-
-    btf = version.input("compressed_btf")
-    expected = {name: btf[name].values for name in (*DECODER_ARRAY_NAMES, "latents")}
-    if "ids" in btf:
-        expected["ids"] = btf["ids"].values.astype(np.min_scalar_type(len(expected["latents"]) - 1))
-    return expected
+    """Parts as the file in the store has them."""
+    return packed_numbers(btf_file_of(version.input("compressed_btf")))
 
 
 @BTF.asset(
@@ -85,29 +80,66 @@ def btf_package(
     from storage.packages import Contents, write_package
     from storage.packages.neural_btf import package_schema
 
-    scenery, tiles = scenery_of(compressed_btf_of(compressed_btf)), settings.cloth_tiles
+    file = btf_file_of(compressed_btf)
+    scenery, tiles = scenery_of(runtime_btf(file)), settings.cloth_tiles
     exposure = home_exposure(scenery, tiles)
     views = reference_views(scenery, tiles, exposure, settings.view_width)
-    parameters = _parameters(scenery.btf) | {"tiles": tiles, "exposure": exposure}
     photograph = restored_images["original"].values[0]
-    values = _values(scenery) | _pictures(settings, scenery, exposure, views, photograph)
-    figures = _figures(keys, scenery.btf, float(restored_images["rmse"]))
-    title, shown = _title(keys), [_view(view) for view in views]
-    content = write_package(
-        package_schema(str(_ids_type(scenery.btf))),
-        Contents(title, [_source(settings, keys)], values, parameters, shown, figures, lineage),
-    )
+    numbers = packed_numbers(file)
+    values = numbers | _meshes(scenery) | _pictures(settings, scenery, exposure, views, photograph)
+    parameters = packed_parameters(file) | {"tiles": tiles, "exposure": exposure}
+    figures = _figures(keys, scenery.btf, restored_images, compressed_btf.sizes["byte"])
+    about = Contents(_title(keys), [_source(settings, keys)], values, parameters)
+    about = replace(about, views=[_view(view) for view in views], figures=figures, lineage=lineage)
+    content = write_package(package_schema(numbers), about)
     return package_dataset(content), {"bytes": len(content), "views": len(views)}
 
 
-def _values(scenery: Scenery) -> dict[str, Any]:
+def packed_numbers(file: BtfFile) -> dict[str, Any]:
+    """Array parts of a package: numbers as the file has them, and their steps."""
+    import numpy as np
+
+    from storage.btf_file import Quantised
+    from storage.packages.neural_btf import STUDENT, TENSORS
+
+    def packed(tensor: Tensor) -> NDArray[Any]:
+        return tensor.symbols.astype(np.int8) if isinstance(tensor, Quantised) else tensor
+
+    def step(tensor: Tensor) -> NDArray[np.float32]:
+        return tensor.step if isinstance(tensor, Quantised) else np.ones((), np.float32)
+
+    values: dict[str, Any] = {}
+    for prefix, decoder in (("", file.decoder), (STUDENT, file.student)):
+        if decoder:
+            values |= {prefix + name: packed(decoder[name]) for name in TENSORS}
+            values[f"{prefix}steps"] = np.array([step(decoder[name]) for name in TENSORS])
+    values["latents"] = packed(file.latents)
+    values["latent_steps"] = np.broadcast_to(step(file.latents), values["latents"].shape[-1:])
+    if file.ids is not None:
+        values["ids"] = file.ids.astype(np.min_scalar_type(len(values["latents"]) - 1))
+    if file.mips:
+        values["mips"] = np.concatenate([packed(level) for level in file.mips])
+        values["mip_steps"] = file.mips[0].step
+    if file.parallax is not None:
+        values["parallax"] = file.parallax
+    return values
+
+
+def packed_parameters(file: BtfFile) -> dict[str, Any]:
+    """Parameters of a package that the file has; an infinite bound is the largest float32."""
+    import numpy as np
+
+    most = float(np.finfo(np.float32).max)
+    bounds = {"least": max(file.least, -most), "largest": min(file.largest, most)}
+    return {"alpha": file.alpha, "height": file.height, "width": file.width, **bounds}
+
+
+def _meshes(scenery: Scenery) -> dict[str, Any]:
     from storage.packages import Mesh
 
-    btf, cloth, around = scenery
+    _, cloth, around = scenery
     assert around is not None
-    values = {
-        **btf.decoder,
-        "latents": btf.latents,
+    return {
         "cloth": Mesh(
             cloth.vertices,
             cloth.triangles,
@@ -117,20 +149,6 @@ def _values(scenery: Scenery) -> dict[str, Any]:
         ),
         "room": Mesh(around.vertices, around.triangles, attributes={"RADIANCE": around.radiance}),
     }
-    if btf.ids is not None:
-        values["ids"] = btf.ids.astype(_ids_type(btf))
-    return values
-
-
-def _ids_type(btf: CompressedBtf) -> np.dtype[Any]:
-    """The smallest integer that numbers the latents."""
-    import numpy as np
-
-    return np.min_scalar_type(len(btf.latents) - 1)
-
-
-def _parameters(btf: CompressedBtf) -> dict[str, Any]:
-    return {"alpha": btf.alpha, "height": btf.height, "width": btf.width}
 
 
 def _pictures(
@@ -173,7 +191,9 @@ def _source(settings: BtfPackageSettings, keys: Mapping[str, str]) -> Source:
     return Source(material, _BUILT_IN if material in MATERIALS else given)
 
 
-def _figures(keys: Mapping[str, str], btf: CompressedBtf, rmse: float) -> list[Figure]:
+def _figures(
+    keys: Mapping[str, str], btf: CompressedBtf, restored_images: xr.Dataset, file_bytes: int
+) -> list[Figure]:
     """Errors and bytes, the paper's tables beside them where they have such a row and column."""
     from storage.packages import Figure, PaperFigure
 
@@ -187,8 +207,8 @@ def _figures(keys: Mapping[str, str], btf: CompressedBtf, rmse: float) -> list[F
             row, errors = _TABLE_2[keys["material"]]
             told = PaperFigure(errors[column], f"table 2, {row}, {words}")
     return [
-        Figure("RMSE over alpha", rmse, "1", told),
-        Figure("Decoder, latents, index list", float(btf.payload_bytes), "byte", size),
+        Figure("RMSE over alpha", float(restored_images["rmse"]), "1", told),
+        Figure("Compressed BTF, one file", float(file_bytes), "byte", size),
         Figure("Texels", float(btf.texels)),
         Figure("Latent vectors", float(len(btf.latents))),
     ]

@@ -23,7 +23,6 @@ from pipelines.neural_btf.surface_lookup import (
     held_directions,
     in_frames,
     surface_frames,
-    texels_at,
     unit,
 )
 
@@ -72,8 +71,14 @@ def reference_views(
     for name, camera, direction, count in wanted:
         light = unit_light(direction)
         showing = Showing(light, count, exposure)
-        size = {"width": width, "height": width * 3 // 4, "supersampling": SUPERSAMPLING}
-        drawn = draw_cloth(scenery, showing, camera, **size)
+        drawn = draw_cloth(
+            scenery,
+            showing,
+            camera,
+            width=width,
+            height=width * 3 // 4,
+            supersampling=SUPERSAMPLING,
+        )
         found.append(ReferenceView(name, camera, light, count, to_8bit(drawn[..., :3])))
     return tuple(found)
 
@@ -100,6 +105,23 @@ def unit_light(direction: tuple[float, float, float]) -> tuple[float, float, flo
     return x, y, z
 
 
+class ClothSights(NamedTuple):
+    """What pixels of a picture see of the cloth, N of them."""
+
+    seen: NDArray[np.bool_]
+    """(y, x) which pixels."""
+    picture: NDArray[np.float32]
+    """(y, x, 4) what the others show."""
+    places: NDArray[np.float64]
+    """(N, 2) in the material, in tiles."""
+    footprint: NDArray[np.float64]
+    """(N,) root of the area of the material that a pixel sees, in tiles."""
+    light: NDArray[np.float64]
+    """(N, 3) unit vectors to the light in the material's frame, not held."""
+    view: NDArray[np.float64]
+    """(N, 3) unit vectors to the eye in the material's frame, not held."""
+
+
 def decoded_cloth(
     scenery: Scenery, showing: Showing, camera: Camera, size: tuple[int, int]
 ) -> NDArray[np.float32]:
@@ -108,28 +130,34 @@ def decoded_cloth(
     Faster without a graphics card, and independent of the shader that decodes. The camera is a
     perspective one.
     """
+    sights = cloth_sights(scenery, showing, camera, size)
+    light, view = held_directions(sights.light), held_directions(sights.view)
+    radiance = scenery.btf.radiance_at(sights.places, light, view, sights.footprint)
+    dimmed = radiance * dimming(sights.light[:, 2])[:, None]
+    sights.picture[sights.seen, :3] = np.maximum(dimmed, 0) * showing.exposure
+    return sights.picture
+
+
+def cloth_sights(
+    scenery: Scenery, showing: Showing, camera: Camera, size: tuple[int, int]
+) -> ClothSights:
+    """Where ``size`` (x, y) pixels of a perspective camera see the cloth, and from where."""
     cloth = scenery.cloth
     # Nothing else is darker than black.
     picture = _painted(scenery, np.full((len(cloth.vertices), 3), -1.0), camera, size)
     seen = picture[..., 0] < 0
-    place, position, normal, tangent = (
+    position, normal, tangent = (
         _painted(scenery, values, camera, size)[seen][:, :3].astype(np.float64)
-        for values in (
-            np.pad(cloth.places * showing.tiles, ((0, 0), (0, 1))),
-            cloth.vertices,
-            cloth.normals,
-            cloth.tangents,
-        )
+        for values in (cloth.vertices, cloth.normals, cloth.tangents)
     )
+    placed = draw_cloth(scenery, showing, camera, width=size[0], height=size[1], places=True)
+    places = placed[seen].astype(np.float64)
     towards = unit(np.asarray(camera.position) - position)
     normal *= np.where(np.sum(normal * towards, axis=1, keepdims=True) < 0, -1.0, 1.0)
     frame = surface_frames(normal, tangent)
     light = np.einsum("nij,j->ni", frame, np.asarray(showing.light))
-    view = held_directions(in_frames(frame, towards))
-    texels = texels_at(place[:, :2], scenery.btf)
-    radiance = scenery.btf.radiance(texels, held_directions(light), view)
-    picture[seen, :3] = np.maximum(radiance * dimming(light[:, 2])[:, None], 0) * showing.exposure
-    return picture
+    view = in_frames(frame, towards)
+    return ClothSights(seen, picture, places[:, :2], places[:, 2], light, view)
 
 
 def _painted(

@@ -1,6 +1,7 @@
 """Cloth on the stage by a shader that holds the decoder: what live pictures elsewhere show, too.
 
-`panel` asks torch for each pixel instead, which is faster without a graphics card.
+`live_parts.decoded_cloth` asks torch for each pixel instead, which is faster without a graphics
+card.
 """
 
 from __future__ import annotations
@@ -14,12 +15,11 @@ from numpy.typing import NDArray
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface, texture
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.decoder_arrays import HIDDEN, LAYERS, DecoderArrays
+from pipelines.neural_btf.decoder_arrays import LAYERS, DecoderArrays
 from pipelines.neural_btf.hanging_cloth import HangingCloth, Surroundings
+from pipelines.neural_btf.latent_texture import MONOMIALS
 
 _FOUR = 4
-_VECTORS = -(-HIDDEN // _FOUR)
-"""Of four neurons, of a hidden layer."""
 _LONGEST_ROW = 2048
 _FAR_AWAY = 1e4
 """An orthographic camera is so many times as far away as its position."""
@@ -44,12 +44,18 @@ class Showing(NamedTuple):
     """Factor on the cloth's radiance."""
 
 
+def decoder_vectors(decoder: DecoderArrays) -> int:
+    """Vectors of four neurons of a hidden layer: `VECTORS` of `btf_decoder.glsl`."""
+    return -(-len(decoder["bias_1"]) // _FOUR)
+
+
 def weight_texels(decoder: DecoderArrays) -> NDArray[np.float32]:
-    """Weights and biases as `btf_decoder.glsl` has them, (82, 109, 4).
+    """Weights and biases as `btf_decoder.glsl` has them, (82, 109, 4) for 106 neurons.
 
     A row is four neurons, a column an input, the last column the bias. What pads layers is 0.
     """
-    texels = np.zeros((_VECTORS * (LAYERS - 1) + 1, _VECTORS * _FOUR + 1, _FOUR), np.float32)
+    vectors = decoder_vectors(decoder)
+    texels = np.zeros((vectors * (LAYERS - 1) + 1, vectors * _FOUR + 1, _FOUR), np.float32)
     for layer in range(1, LAYERS + 1):
         weight, bias = decoder[f"weight_{layer}"], decoder[f"bias_{layer}"]
         outputs, inputs = weight.shape
@@ -57,13 +63,13 @@ def weight_texels(decoder: DecoderArrays) -> NDArray[np.float32]:
         padded = np.zeros((rows * _FOUR, texels.shape[1]), np.float32)
         padded[:outputs, :inputs] = weight
         padded[:outputs, -1] = bias
-        first = _VECTORS * (layer - 1)
+        first = vectors * (layer - 1)
         texels[first : first + rows] = padded.reshape(rows, _FOUR, -1).transpose(0, 2, 1)
     return texels
 
 
 def latent_texels(latents: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Latents (k, 8) as lines of texels (y, x, 4), two texels a vector."""
+    """Latents (n, 8) as lines of texels (y, x, 4), two texels a vector."""
     columns = min(2 * len(latents), _LONGEST_ROW)
     rows = -(-2 * len(latents) // columns)
     texels = np.zeros((rows * columns, _FOUR), np.float32)
@@ -71,16 +77,39 @@ def latent_texels(latents: NDArray[np.float32]) -> NDArray[np.float32]:
     return texels.reshape(rows, columns, _FOUR)
 
 
-def cloth_actor(btf: CompressedBtf, cloth: HangingCloth, showing: Showing, camera: Camera) -> Any:
-    """The cloth as this camera sees it, in one draw call."""
+def material_values(btf: CompressedBtf) -> dict[str, Any]:
+    """What names in capitals of `btf_decoder.glsl` and `btf_latents.glsl` stand for, and of
+    `btf_cloth_fragment.glsl` those that are the material's."""
+    most = float(np.finfo(np.float32).max)
+    parallax = np.zeros((MONOMIALS, 2)) if btf.parallax is None else btf.parallax
+    return {
+        "VECTORS": decoder_vectors(btf.decoder),
+        "TEXELS": [btf.width, btf.height],
+        "LEVELS": 1 + len(btf.mips),
+        "PARALLAX": parallax.astype(float).ravel().tolist(),
+        "LEAST": max(float(btf.least), -most),
+        "LARGEST": min(float(btf.largest), most),
+    }
+
+
+def cloth_actor(
+    btf: CompressedBtf,
+    cloth: HangingCloth,
+    showing: Showing,
+    camera: Camera,
+    *,
+    places: bool = False,
+) -> Any:
+    """The cloth as this camera sees it, in one draw call.
+
+    ``places``: red and green are where in the material it is, in tiles, blue the footprint there.
+    """
     position = np.asarray(camera.position)
     if camera.height is not None:
         target = np.asarray(camera.target)
         position = target + _FAR_AWAY * (position - target)
-    lines = {"weights": weight_texels(btf.decoder), "latentVectors": latent_texels(btf.latents)}
-    if btf.ids is not None:
-        numbers = btf.ids.reshape(btf.height, btf.width, 1)
-        lines["owners"] = numbers.astype(np.float32)
+    levels = np.concatenate([btf.latents_of(slice(None)), *btf.mips])
+    lines = {"weights": weight_texels(btf.decoder), "latentVectors": latent_texels(levels)}
     return surface(
         cloth.vertices,
         cloth.triangles,
@@ -93,8 +122,8 @@ def cloth_actor(btf: CompressedBtf, cloth: HangingCloth, showing: Showing, camer
         shader=surface_shader(
             "btf_cloth_vertex.glsl",
             "btf_cloth_fragment.glsl",
-            SHARED=btf.ids is not None,
-            TEXELS=[btf.width, btf.height],
+            **material_values(btf),
+            PLACES=places,
             TILES=float(showing.tiles),
             LIGHT=list(showing.light),
             EYE=position.tolist(),
@@ -112,11 +141,12 @@ def draw_cloth(
     width: int,
     height: int,
     supersampling: int = 1,
+    places: bool = False,
 ) -> NDArray[np.float32]:
-    """Linear radiance and coverage (height, width, 4)."""
+    """Linear radiance and coverage (height, width, 4); ``places`` as of `cloth_actor`."""
     around = scenery.around
     with Stage(width, height, supersampling=supersampling) as stage:
-        stage.add(cloth_actor(scenery.btf, scenery.cloth, showing, camera))
+        stage.add(cloth_actor(scenery.btf, scenery.cloth, showing, camera, places=places))
         if around is not None:
             attributes = {"shown": around.radiance}
             stage.add(

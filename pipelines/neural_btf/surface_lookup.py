@@ -1,6 +1,6 @@
 """Where on a material a point of a surface lies, and how it is seen and lit there.
 
-The same as the shaders `btf_cloth_fragment.glsl` and `btf_directions.glsl`.
+The same as the shader `btf_directions.glsl`.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 // The neural BTF's decoder (paper 1, figure 5): 8 latents and two directions to RGB over alpha by
-// three hidden layers of 106 neurons, padded to 27 vectors. A row of the texture is four neurons, a
-// texel of it an input, the last one the bias; a layer's rows follow those of the layer before.
+// three hidden layers, padded to VECTORS vectors of four neurons: 27 for the paper's 106. A row of
+// the texture is four neurons, a texel of it an input, the last one the bias; a layer's rows follow
+// those of the layer before.
 
 #include "stereographic.glsl"
 
 uniform sampler2D weights;
 // What a layer is given, and what it says. As arguments, arrays would be copied for each row.
-vec4 given[27];
-vec4 said[27];
+vec4 given[VECTORS];
+vec4 said[VECTORS];
 
 // Four neurons' share of four inputs, the first of which is in this column.
 vec4 fourInputs(int column, int row, vec4 values) {
@@ -19,9 +20,9 @@ vec4 fourInputs(int column, int row, vec4 values) {
 
 // Four neurons of what a hidden layer gave.
 vec4 fourNeurons(int row) {
-  vec4 sum = texelFetch(weights, ivec2(108, row), 0);
+  vec4 sum = texelFetch(weights, ivec2(4 * VECTORS, row), 0);
 #pragma unroll_loop_start
-  for (int i = 0; i < 27; i++) {
+  for (int i = 0; i < VECTORS; i++) {
     sum += fourInputs(4 * i, row, given[i]);
   }
 #pragma unroll_loop_end
@@ -31,16 +32,17 @@ vec4 fourNeurons(int row) {
 // latents: the first and the last four. Directions are unit vectors in the texture's frame, z >= 0.
 vec3 decodedColour(vec4 latents[2], vec3 light, vec3 view) {
   vec4 directions = vec4(stereographicPlace(light), stereographicPlace(view));
-  for (int row = 0; row < 27; row++) {
-    given[row] = max(texelFetch(weights, ivec2(108, row), 0) + fourInputs(0, row, latents[0]) +
-                     fourInputs(4, row, latents[1]) + fourInputs(8, row, directions), 0.0);
+  for (int row = 0; row < VECTORS; row++) {
+    given[row] = max(texelFetch(weights, ivec2(4 * VECTORS, row), 0) +
+                     fourInputs(0, row, latents[0]) + fourInputs(4, row, latents[1]) +
+                     fourInputs(8, row, directions), 0.0);
   }
   // One loop for all layers: the unrolled sum is long to compile.
   vec4 sum;
   for (int layer = 1; layer < 4; layer++) {
-    int rows = layer < 3 ? 27 : 1;
+    int rows = layer < 3 ? VECTORS : 1;
     for (int row = 0; row < rows; row++) {
-      sum = fourNeurons(27 * layer + row);
+      sum = fourNeurons(VECTORS * layer + row);
       said[row] = max(sum, 0.0);
     }
     given = said;

@@ -70,8 +70,13 @@ _GLASS: dict[str, Any] = {
     "COVERED_B": [1.0, 1.0, 1.0, 1.0],
     "STRENGTH": 0.5,
 }
-_DISTANCES: dict[str, Any] = {"LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5}
+_LATENTS: dict[str, Any] = {"TEXELS": [48, 32], "LEVELS": 7, "PARALLAX": [0.1] * 18}
+_FUNCTION_VALUES: dict[str, Any] = {
+    **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
+}  # fmt: skip
 CONSTANTS: dict[str, tuple[str, ...]] = {
+    "btf_decoder.glsl": ("VECTORS",),
+    "btf_latents.glsl": ("TEXELS", "LEVELS", "PARALLAX"),
     "lit_lobes.glsl": ("LEAST_VIEW",),
     "ssdf_lookup.glsl": ("SIDE",),
     "lit_distances.glsl": ("LEAST_VIEW", "SIDE", "LIGHTS"),
@@ -110,7 +115,9 @@ _GRID: dict[str, Any] = {
     "GRID_STEPS": [12.0, 5.0],
 }
 _CLOTH: dict[str, Any] = {
-    "TEXELS": [48, 32],
+    **_LATENTS,
+    "LEAST": 0.0,
+    "LARGEST": 1.0,
     "TILES": 4.0,
     "LIGHT": [0.0, -1.0, 0.0],
     "EYE": [1.0, -4.0, 0.5],
@@ -118,7 +125,10 @@ _CLOTH: dict[str, Any] = {
 }
 STAGES: list[tuple[str, dict[str, Any]]] = [
     ("painted", {}),
-    *(("btf_cloth", _CLOTH | {"SHARED": shared}) for shared in (True, False)),
+    *(
+        ("btf_cloth", _CLOTH | {"VECTORS": vectors, "PLACES": places})
+        for vectors, places in ((27, False), (11, False), (27, True))
+    ),
     *(("fur", {"CODE_STEPS": 25.0, "DECAY": 0.3, "COLUMNS": columns}) for columns in (True, False)),
     *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
     ("scratched_glass", _GLASS),
@@ -173,7 +183,7 @@ def compiled(folder: Path, sources: dict[str, str]) -> None:
 def test_a_file_of_functions_compiles_in_both_kinds_of_shaders(
     name: str, dialect: str, tmp_path: Path
 ) -> None:
-    values = {constant: _DISTANCES[constant] for constant in CONSTANTS.get(name, ())}
+    values = {constant: _FUNCTION_VALUES[constant] for constant in CONSTANTS.get(name, ())}
     source = _DIALECTS[dialect] + shader_source(name, **values)
     compiled(
         tmp_path,
