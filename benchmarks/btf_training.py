@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assets_defs.neural_btf.network import NetworkSettings, training_plan
-from benchmarks.btf_factorisation import btf_rmse
+from benchmarks.btf_errors import btf_rmse
 from pipelines.light.directions import Pairs
 from pipelines.neural_btf.compressed import CompressedBtf
 from pipelines.neural_btf.network import decoder_arrays

@@ -1,0 +1,1 @@
+"""The strongest other forms of a BTF, each at a given number of bytes."""
