@@ -252,6 +252,7 @@ def quantised_btf_file(
         ids=ids if abrdf_clusters.sizes["cluster"] < len(ids) else None,
         mips=tuple(Quantised(level, network.mip_steps) for level in network.mips),
         parallax=network.parallax,
+        student={name: Quantised(*part) for name, part in network.student.items()},
     )
 
 

@@ -18,6 +18,8 @@ DIRECTIONS = 4
 """Light and view on the stereographic plane, two numbers each."""
 HIDDEN = 106
 """Neurons of a hidden layer: three of them give the 24 383 parameters of the paper's table 1."""
+STUDENT_HIDDEN = 44
+"""Neurons of a hidden layer of the smaller decoder: a fifth of the products, four a vector."""
 LAYERS = 4
 DECODER_PARAMETERS = (
     (LATENTS + DIRECTIONS) * HIDDEN + HIDDEN + 2 * (HIDDEN * HIDDEN + HIDDEN) + HIDDEN * 3 + 3

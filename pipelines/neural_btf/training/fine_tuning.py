@@ -20,13 +20,19 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn.utils import parametrize
 
+from pipelines.neural_btf.decoder_arrays import STUDENT_HIDDEN
 from pipelines.neural_btf.latent_texture import averaged, level_sizes
 from pipelines.neural_btf.mips import AveragedAbrdfs
 from pipelines.neural_btf.network import Decoder, decoder_arrays, decoder_of, device
 from pipelines.neural_btf.training.batches import Batches
 from pipelines.neural_btf.training.data import TrainingData
 from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
-from pipelines.neural_btf.training.optimisers import adam, decoder_optimisers, rate_share
+from pipelines.neural_btf.training.optimisers import (
+    adam,
+    decoder_optimisers,
+    parallax_optimiser,
+    rate_share,
+)
 from pipelines.neural_btf.training.plan import FineTuningPlan
 from pipelines.neural_btf.training.quantiser import Quantiser
 from pipelines.neural_btf.training.trainer import KEEP_SECONDS, TrainedNetwork
@@ -36,6 +42,9 @@ _FIRST_STEPS = {"weight": 0.08, "bias": 0.02, "latents": 0.2, "mips": 0.3}
 _STEP_RATE = 0.01
 _PRICE_RATE = 0.02
 _FIRST_PRICE = 3e-10
+_STUDENT_RATE = 3.0
+"""Of the plan's rate: the student begins at random."""
+_STUDENT_WEIGHT = 0.5
 _MIP_TEXELS = 32
 _MIP_WEIGHT = 4.0
 """Errors of means are smaller than those of texels, and should stay so."""
@@ -58,6 +67,8 @@ class QuantisedNetwork(NamedTuple):
     """(8,)."""
     parallax: NDArray[np.float32] | None
     """(9, 2)."""
+    student: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
+    """A smaller decoder of the same latents."""
     curve_step: NDArray[np.int64]
     curve_rmse: NDArray[np.float64]
     """Root of the mean squared error since the point before, values over alpha."""
@@ -119,9 +130,12 @@ class FineTuning:
         self.mips = self._parameter(_coarse_latents(trained.latents, data))
         self.of_latents = self._quantiser(self.latents, "latents")
         self.of_mips = self._quantiser(self.mips, "mips")
-        weights = {name: part for name, (_, part) in _quantised_parts(self.decoder).items()}
+        self.student = _quantised_decoder(Decoder(STUDENT_HIDDEN)).to(self._device).train()
+        weights, small = _originals(self.decoder), _originals(self.student)
         self._optimisers = [
-            *decoder_optimisers(weights, [self.latents, self.mips], self.parallax, plan.rate),
+            *decoder_optimisers(weights, [self.latents, self.mips], plan.rate),
+            *decoder_optimisers(small, [], _STUDENT_RATE * plan.rate),
+            parallax_optimiser(self.parallax, plan.rate),
             adam(self._log_steps(), _STEP_RATE),
         ]
         self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
@@ -129,7 +143,8 @@ class FineTuning:
         self._price, self._true_share = _FIRST_PRICE, 1.0
         self._curve: list[tuple[int, float]] = []
         self._squares, self._count = 0.0, 0
-        numbers = sum(part.numel() for part in (*weights.values(), self.latents, self.mips))
+        parts = (*weights.values(), *small.values(), self.latents, self.mips)
+        numbers = sum(part.numel() for part in parts)
         self.wanted_bytes = plan.bits * numbers / 8
 
     # ---- a step ------------------------------------------------------------------------------
@@ -143,8 +158,11 @@ class FineTuning:
                 group["lr"] = rate * share
         random = np.random.default_rng((plan.seed, 4, self.steps_done))
         with parametrize.cached():
-            error = self._error(random)
-            loss = error + _MIP_WEIGHT * self._mip_error(random) if self._sizes else error
+            error, of_student = self._errors(random)
+            loss = error + _STUDENT_WEIGHT * of_student
+            if self._sizes:
+                of_mips, student_of_mips = self._mip_errors(random)
+                loss = loss + _MIP_WEIGHT * (of_mips + _STUDENT_WEIGHT * student_of_mips)
             bits = self._bits()
             loss = loss + self._price * bits
             for optimiser in self._optimisers:
@@ -172,8 +190,8 @@ class FineTuning:
 
     # ---- losses ------------------------------------------------------------------------------
 
-    def _error(self, random: np.random.Generator) -> Tensor:
-        """Mean squared error of the finest level on a batch, over alpha."""
+    def _errors(self, random: np.random.Generator) -> tuple[Tensor, Tensor]:
+        """Mean squared error of the finest level on a batch, over alpha, and the student's."""
         images = self._batches.images_by_view(random, self._plan.batch_images)
         batch = self._batches.rows(random, self.steps_done, self._plan.batch_texels, images.ravel())
         owners = torch.from_numpy(batch.owners).to(self._device)
@@ -183,9 +201,9 @@ class FineTuning:
             latents = latents_beside(table, self._data.size, owners, offsets)
         else:
             latents = table[owners][:, None].expand(-1, len(images), -1)
-        return self._difference(latents, images, batch.values)
+        return self._differences(latents, images, batch.values)
 
-    def _mip_error(self, random: np.random.Generator) -> Tensor:
+    def _mip_errors(self, random: np.random.Generator) -> tuple[Tensor, Tensor]:
         """The same of a coarser level, drawn: those of more texels more often."""
         sizes = np.array([rows * columns for rows, columns in self._sizes])
         level = int(random.choice(len(sizes), p=np.sqrt(sizes) / np.sqrt(sizes).sum()))
@@ -201,20 +219,27 @@ class FineTuning:
         latents = latents_beside(table, (rows, columns), where, offsets * scale.to(self._device))
         numbers = np.searchsorted(held, images.ravel())
         values = self._coarse.levels[level][texels[:, None], numbers[None]]
-        return self._difference(latents, images, values)
+        return self._differences(latents, images, values)
 
-    def _difference(
+    def _differences(
         self, latents: Tensor, images: NDArray[np.int64], values: NDArray[np.floating]
-    ) -> Tensor:
-        with torch.autocast(self._device.type, torch.bfloat16):
-            colours = self.decoder.grid_by_view(latents, self._directions[images])
+    ) -> tuple[Tensor, Tensor]:
+        directions = self._directions[images]
         wanted = torch.from_numpy(np.ascontiguousarray(values)).to(self._device).float()
-        return ((colours.float() - wanted / self._data.scale.alpha) ** 2).mean()
+        wanted = wanted / self._data.scale.alpha
+
+        def error(decoder: Decoder) -> Tensor:
+            with torch.autocast(self._device.type, torch.bfloat16):
+                colours = decoder.grid_by_view(latents, directions)
+            return ((colours.float() - wanted) ** 2).mean()
+
+        return error(self.decoder), error(self.student)
 
     def _bits(self) -> Tensor:
         total = self.of_latents.bits(self.latents) + self.of_mips.bits(self.mips)
-        for quantiser, original in _quantised_parts(self.decoder).values():
-            total = total + quantiser.bits(original)
+        for decoder in (self.decoder, self.student):
+            for quantiser, original in _quantised_parts(decoder).values():
+                total = total + quantiser.bits(original)
         return total
 
     # ---- result ------------------------------------------------------------------------------
@@ -224,15 +249,13 @@ class FineTuning:
         symbols = self.of_mips.symbols(self.mips)
         ends = np.cumsum([rows * columns for rows, columns in self._sizes], dtype=np.int64)
         return QuantisedNetwork(
-            {
-                name: (quantiser.symbols(original), quantiser.steps().reshape(()))
-                for name, (quantiser, original) in _quantised_parts(self.decoder).items()
-            },
+            _symbols(self.decoder),
             self.of_latents.symbols(self.latents),
             self.of_latents.steps(),
             tuple(np.split(symbols, ends[:-1])) if self._sizes else (),
             self.of_mips.steps(),
             self.parallax.detach().cpu().numpy().copy() if self._has_parallax else None,
+            _symbols(self.student),
             np.array([step for step, _ in self._curve], np.int64),
             np.array([value for _, value in self._curve], np.float64),
         )
@@ -246,6 +269,7 @@ class FineTuning:
             {
                 "trained": {name: part.detach() for name, part in self._trained().items()},
                 "decoder": self.decoder.state_dict(),
+                "student": self.student.state_dict(),
                 "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
                 "position": [self.steps_done, self._count],
                 "price": [self._price, self._true_share, self._squares],
@@ -259,6 +283,7 @@ class FineTuning:
         """Go on from a state of the same data, network and plan."""
         saved = torch.load(io.BytesIO(kept), map_location=self._device, weights_only=True)
         self.decoder.load_state_dict(saved["decoder"])
+        self.student.load_state_dict(saved["student"])
         with torch.no_grad():
             for name, part in self._trained().items():
                 part.copy_(saved["trained"][name])
@@ -286,7 +311,8 @@ class FineTuning:
         return Quantiser(values, _FIRST_STEPS[kind], by_channel=True).to(self._device)
 
     def _log_steps(self) -> list[nn.Parameter]:
-        parts = [quantiser for quantiser, _ in _quantised_parts(self.decoder).values()]
+        both = (_quantised_parts(part).values() for part in (self.decoder, self.student))
+        parts = [quantiser for decoder in both for quantiser, _ in decoder]
         return [part.log_step for part in (*parts, self.of_latents, self.of_mips)]
 
 
@@ -307,6 +333,19 @@ def _quantised_parts(decoder: Decoder) -> dict[str, tuple[Quantiser, Tensor]]:
             entry: Any = layer.get_submodule(f"parametrizations.{name}")
             parts[f"{name}_{number}"] = (entry[0], entry.original)
     return parts
+
+
+def _originals(decoder: Decoder) -> dict[str, Tensor]:
+    """Unrounded values of ``weight_1``, ``bias_1`` …"""
+    return {name: original for name, (_, original) in _quantised_parts(decoder).items()}
+
+
+def _symbols(decoder: Decoder) -> dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]:
+    """Whole numbers and step () of ``weight_1``, ``bias_1`` …"""
+    return {
+        name: (quantiser.symbols(original), quantiser.steps().reshape(()))
+        for name, (quantiser, original) in _quantised_parts(decoder).items()
+    }
 
 
 def _coarse_latents(latents: NDArray[np.float32], data: TrainingData) -> NDArray[np.float32]:

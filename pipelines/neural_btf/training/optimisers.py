@@ -39,23 +39,25 @@ def stage_optimisers(
         for number, layer in enumerate(decoder.layers, start=1)
         for kind in ("weight", "bias")
     }
-    return decoder_optimisers(weights, [latents], parallax, rate)
+    return [*decoder_optimisers(weights, [latents], rate), parallax_optimiser(parallax, rate)]
 
 
 def decoder_optimisers(
-    weights: Mapping[str, Tensor], latents: Sequence[Tensor], parallax: Tensor, rate: float
+    weights: Mapping[str, Tensor], latents: Sequence[Tensor], rate: float
 ) -> list[torch.optim.Optimizer]:
-    """Muon for the hidden layers, Adam for the others, for latents and for parallax.
+    """Muon for a decoder's hidden layers, Adam for the others and for latents.
 
-    ``weights``: ``weight_1``, ``bias_1`` … of the decoder.
+    ``weights``: ``weight_1``, ``bias_1`` …
     """
     hidden = [weights["weight_2"], weights["weight_3"]]
     others = [part for part in weights.values() if all(part is not matrix for matrix in hidden)]
-    return [
-        adam([*others, *latents], rate),
-        adam([parallax], _PARALLAX_RATE * rate),
-        torch.optim.Muon(hidden, lr=rate, weight_decay=0.0),
-    ]
+    muon = torch.optim.Muon(hidden, lr=rate, weight_decay=0.0)
+    return [adam([*others, *latents], rate), muon]
+
+
+def parallax_optimiser(parallax: Tensor, rate: float) -> torch.optim.Optimizer:
+    """Adam for parallax; ``rate`` is that of the decoder."""
+    return adam([parallax], _PARALLAX_RATE * rate)
 
 
 def rate_share(stage: StageName, fraction: float) -> float:

@@ -57,7 +57,10 @@ def test_the_encoder_sees_representatives_whatever_is_fitted() -> None:
     directions = np.zeros((IMAGES, 4), np.float32)
     pool = AbrdfPool.of_array(ABRDFS)
     for plan in (TrainingPlan(), TrainingPlan("paper")):
-        data = training_data(pool, CLUSTERED, scale, directions, plan)
+        data = training_data(pool, CLUSTERED, scale, directions, (3, 4), plan)
         assert data.representatives is CLUSTERED.representatives
         assert data.latent_count == 3
-    assert training_data(pool, SINGLE, scale, directions, TrainingPlan()).representatives is None
+    assert (
+        training_data(pool, SINGLE, scale, directions, (3, 4), TrainingPlan()).representatives
+        is None
+    )

@@ -9,15 +9,13 @@ from pipelines.neural_btf.network import Decoder, Encoder
 from pipelines.neural_btf.training.optimisers import rate_share, stage_optimisers
 from pipelines.neural_btf.training.plan import StageName
 
-ALL = {"encoder", "decoder", "latents"}
-
 
 @pytest.mark.parametrize(
     ("stage", "trained", "rates"),
     [
         ("paper", {"encoder", "decoder"}, {0.125}),
         ("encoder", {"encoder", "decoder"}, {0.002}),
-        ("latents", {"latents", "decoder"}, {0.125}),
+        ("latents", {"latents", "parallax", "decoder"}, {0.125, 0.375}),
         ("distil", {"encoder"}, {0.002}),
     ],
 )
@@ -26,12 +24,14 @@ def test_a_stage_trains_its_parts_each_parameter_once(
 ) -> None:
     encoder, decoder = Encoder(81, (4, 6)), Decoder()
     latents = torch.zeros(5, 8, requires_grad=True)
+    parallax = torch.zeros(9, 2, requires_grad=True)
     parts = {
         "encoder": list(encoder.parameters()),
         "decoder": list(decoder.parameters()),
         "latents": [latents],
+        "parallax": [parallax],
     }
-    found = stage_optimisers(stage, encoder, decoder, latents, 0.125)
+    found = stage_optimisers(stage, encoder, decoder, (latents, parallax), 0.125)
     held = [part for one in found for group in one.param_groups for part in group["params"]]
     expected = [part for name in trained for part in parts[name]]
     assert sorted(map(id, held)) == sorted(map(id, expected))

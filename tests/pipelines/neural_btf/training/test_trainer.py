@@ -17,6 +17,7 @@ from pipelines.neural_btf.abrdf import PhotographBlocks, standardised, transpose
 from pipelines.neural_btf.abrdf_pool import AbrdfPool, mean_abrdfs
 from pipelines.neural_btf.clusters import AbrdfClusters, single_texel_clusters, warm_start
 from pipelines.neural_btf.decoder_arrays import LATENTS, direction_inputs
+from pipelines.neural_btf.latent_texture import between_texels, parallax_terms
 from pipelines.neural_btf.network import Decoder, decoder_arrays, encoder_of, encoder_vector
 from pipelines.neural_btf.principal_abrdfs import summarise_abrdfs
 from pipelines.neural_btf.training import batches
@@ -27,6 +28,7 @@ from pipelines.neural_btf.training.data import (
     TrainingTargets,
     training_data,
 )
+from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
 from pipelines.neural_btf.training.plan import TrainingPlan
 from pipelines.neural_btf.training.trainer import TrainedNetwork, Trainer, train
 
@@ -34,15 +36,22 @@ SIDE = 8
 WIDTHS = (4, 6)
 PAIRS: Pairs = all_pairs(hemisphere_table(15), hemisphere_table(15))
 
-FAST = TrainingPlan("fast", 30, 0.01, batch_texels=8, batch_images=16, widths=WIDTHS)
+FAST = TrainingPlan(
+    "fast", 30, 0.01, batch_texels=8, batch_images=16, widths=WIDTHS, parallax=False
+)
 ENCODER_FIRST = dataclasses.replace(
     FAST, warm_start="encoder", encoder_share=0.4, encoder_steps=10, seed=3
 )
 PAPER = TrainingPlan("paper", 12, 0.05, batch_texels=5, batch_images=0, widths=WIDTHS)
 PLANS = pytest.mark.parametrize(
     "plan",
-    [dataclasses.replace(FAST, encoder_steps=10), ENCODER_FIRST, PAPER],
-    ids=["fast", "encoder first", "paper"],
+    [
+        dataclasses.replace(FAST, encoder_steps=10),
+        dataclasses.replace(FAST, parallax=True),
+        ENCODER_FIRST,
+        PAPER,
+    ],
+    ids=["fast", "parallax", "encoder first", "paper"],
 )
 
 
@@ -94,7 +103,7 @@ def data_of(clusters: int | None = None, *, budget: int | None = None) -> Traini
             ids, np.bincount(ids), np.stack(medians), warm_start(found.scores[:clusters])
         )
     scale = AbrdfScale(found.statistics.mean, found.statistics.deviation, found.alpha)
-    return training_data(pool, groups, scale, direction_inputs(PAIRS), FAST)
+    return training_data(pool, groups, scale, direction_inputs(PAIRS), (SIDE, SIDE), FAST)
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +113,9 @@ def data() -> TrainingData:
 
 def assert_equal_bits(one: TrainedNetwork, two: TrainedNetwork) -> None:
     np.testing.assert_array_equal(one.latents, two.latents)
+    assert (one.parallax is None) == (two.parallax is None)
+    if one.parallax is not None and two.parallax is not None:
+        np.testing.assert_array_equal(one.parallax, two.parallax)
     np.testing.assert_array_equal(encoder_vector(one.encoder), encoder_vector(two.encoder))
     for name, part in decoder_arrays(one.decoder).items():
         np.testing.assert_array_equal(part, decoder_arrays(two.decoder)[name])
@@ -143,6 +155,46 @@ def test_fast_training_restores_better_than_the_best_rank_2_matrix(data: Trainin
     assert error < best_of_rank_2
 
 
+def moved_stripes(texels: float) -> NDArray[np.float16]:
+    """A matt surface of soft coloured stripes, which move by so many texels along x, times the
+    view's stereographic x."""
+    moves = texels * direction_inputs(PAIRS)[:, 2]
+    columns = 2 * np.pi * (np.arange(SIDE) + moves[:, None]) / SIDE
+    rows = 2 * np.pi * np.arange(SIDE) / SIDE
+    across = np.stack([np.sin(columns), np.cos(columns), np.sin(2 * columns)], axis=-1)
+    colour = 0.5 + 0.2 * across[:, None] + 0.1 * np.sin(rows)[None, :, None, None]
+    return (colour * np.cos(PAIRS.light[:, 0])[:, None, None, None]).astype(np.float16)
+
+
+@pytest.mark.parametrize("texels", [0.0, 1.5])
+def test_parallax_that_is_in_the_photographs_is_found(
+    texels: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{__name__}.IMAGES", moved_stripes(texels))
+    data = data_of()
+    plan = dataclasses.replace(FAST, steps=400, batch_texels=32, batch_images=64, parallax=True)
+    found = train(data, plan)
+    assert found.parallax is not None
+    views = np.unique(data.directions[:, 2:], axis=0)
+    across, down = (parallax_terms(views) @ found.parallax).T
+    np.testing.assert_allclose(across, texels * views[:, 0], atol=0.3)
+    np.testing.assert_allclose(down, 0.0, atol=0.3)
+
+
+def test_latents_are_looked_up_as_the_runtime_looks_them_up() -> None:
+    random = np.random.default_rng(2)
+    table = random.standard_normal((15, 8)).astype(np.float32)
+    parallax = random.standard_normal((9, 2)).astype(np.float32)
+    views, texels = random.uniform(-0.8, 0.8, (4, 2)), np.array([0, 14, 7])
+    offsets = parallax_offsets(torch.from_numpy(parallax), torch.from_numpy(views).float())
+    given = torch.from_numpy(table), (3, 5), torch.from_numpy(texels), offsets
+    found = latents_beside(*given).numpy()
+    moves = parallax_terms(views) @ parallax
+    for number, move in enumerate(moves):
+        expected = between_texels(table, (3, 5), texels // 5 + move[1], texels % 5 + move[0])
+        np.testing.assert_allclose(found[:, number], expected, atol=1e-5)
+
+
 def test_paper_training_lowers_the_error(data: TrainingData) -> None:
     plan = dataclasses.replace(PAPER, steps=150)
     targets = transposed(IMAGES) / data.scale.alpha
@@ -160,7 +212,7 @@ def test_rows_count_as_often_as_the_texels_they_stand_for() -> None:
     )
     given = TrainingData(
         targets, None, AbrdfScale(flat, flat + 1, 1.0), direction_inputs(PAIRS),
-        np.zeros((1, LATENTS), np.float32),
+        np.zeros((1, LATENTS), np.float32), np.zeros(2, np.int32), (1, 2),
     )  # fmt: skip
     plan = dataclasses.replace(FAST, steps=200, batch_texels=256, batch_images=4)
     found = restored(train(given, plan))
