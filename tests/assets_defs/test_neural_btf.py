@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from assets_defs.launcher import LaunchError, Request
+from assets_defs.neural_btf import compressed as file_assets
 from assets_defs.neural_btf import datasets
-from assets_defs.neural_btf import network as network_assets
 from assets_defs.neural_btf import package as package_assets
 from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.graph import BTF
@@ -26,9 +26,10 @@ from pipelines.neural_btf import (
     restoration,
 )
 from pipelines.neural_btf.draping import rendering
-from pipelines.neural_btf.training import batches
+from pipelines.neural_btf.training import batches, quantiser
 from pipelines.neural_btf.training import trainer as training
 from pipelines.virtual.cloth import gonioreflectometer
+from storage.btf_file import values_of
 from tests.assets_defs.regressions import Regression, assert_check_finds, materialise
 from tests.storage.readers.btf_writers import FIFTEEN, write_ubo2003_zip
 
@@ -80,8 +81,8 @@ def test_columns_have_the_bytes_of_the_table(good: Any) -> None:
     without = store.open(BTF.slot("compressed_btf", WITHOUT))
     clustered = store.open(BTF.slot("compressed_btf", CLUSTERED))
     assert "ids" not in without
-    assert compressed_btf_of(without).payload_bytes == 4 * (24_383 + 8 * 144)
-    assert compressed_btf_of(clustered).payload_bytes == 4 * (24_383 + 8 * 20 + 144)
+    assert compressed_btf_of(without).latents.shape == (144, 8)
+    assert compressed_btf_of(clustered).latents.shape == (20, 8)
 
 
 def test_a_version_says_what_it_was_made_of(good: Any) -> None:
@@ -211,14 +212,24 @@ def _no_rate(right: Callable[..., Any], self: Any, name: str, fraction: float) -
             group["lr"] = 0.0
 
 
-def _needless_list(right: Callable[..., Any], *datasets: Any) -> Any:
-    return dataclasses.replace(right(*datasets), ids=datasets[1]["ids"].values)
+def _not_rounded(right: Callable[..., Any], *network_and_datasets: Any) -> Any:
+    """Numbers as float32, as if training had not known better."""
+    held = right(*network_and_datasets)
+    return dataclasses.replace(
+        held,
+        decoder={name: values_of(part) for name, part in held.decoder.items()},
+        student={name: values_of(part) for name, part in held.student.items()},
+        latents=values_of(held.latents),
+        mips=(),
+    )
 
 
-def _scaled_weights(right: Callable[..., Any], *datasets: Any) -> Any:
-    packed = right(*datasets)
-    scaled = {**packed.decoder, "weight_2": packed.decoder["weight_2"] * np.float32(1.01)}
-    return dataclasses.replace(packed, decoder=scaled)
+def _next_numbers(right: Callable[..., Any], self: Any, values: Any) -> Any:
+    return np.roll(right(self, values), 1, axis=0)
+
+
+def _other_axes(right: Callable[..., Any], data: bytes, level: int, row: int, column: int) -> Any:
+    return right(data, level, column, row)
 
 
 def _swapped_directions(right: Callable[..., Any], pairs: Any) -> Any:
@@ -289,8 +300,9 @@ REGRESSIONS = (
         lambda right, values, *statistics: right(values, *statistics) * 0.0,
         WITHOUT,
     ),
-    Regression("bytes_over_table", network_assets, "packed_btf", _needless_list, WITHOUT),
-    Regression("decoding_error", network_assets, "packed_btf", _scaled_weights, WITHOUT),
+    Regression("size_ratio", file_assets, "quantised_btf_file", _not_rounded, WITHOUT),
+    Regression("rmse_over_network", quantiser.Quantiser, "symbols", _next_numbers, WITHOUT),
+    Regression("random_access_mismatches", file_assets, "read_texel", _other_axes, CLUSTERED),
     Regression("rmse", restoration, "direction_inputs", _swapped_directions, WITHOUT),
     Regression("rmse_over_none", compressed.CompressedBtf, "latents_of", _next_cluster, CLUSTERED),
     Regression("rmse_over_null", compressed.CompressedBtf, "abrdfs", _mean_colours, WITHOUT),
@@ -443,8 +455,8 @@ def test_a_users_zip_becomes_a_compressed_btf(good: Any, inbox: Path) -> None:
     assert images.attrs["name"] == "Wolle.zip"
     assert "sRGB" in images.attrs["colour"]
     runtime = store.open(BTF.slot("compressed_btf", keys))
-    assert compressed_btf_of(runtime).payload_bytes == 4 * (24_383 + 8 * 12 + 48)
-    assert (int(runtime["height"]), int(runtime["width"])) == (6, 8)
+    btf = compressed_btf_of(runtime)
+    assert (btf.latents.shape, btf.height, btf.width) == ((12, 8), 6, 8)
     runs = good.instance.get_runs_count()
     with pytest.raises(ValueError, match=r"Wolle\.zip: clusters is 49; expected at most 48"):
         good.launcher.launch(Request(BTF, [keys | {"clusters": "49"}]))

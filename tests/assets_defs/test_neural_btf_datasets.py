@@ -23,11 +23,14 @@ from pipelines.neural_btf.clusters import (
     single_texel_clusters,
 )
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.network import Decoder, Encoder, decoder_arrays, encoder_vector
 from pipelines.neural_btf.draping.frames import ClothFrames
+from pipelines.neural_btf.latent_texture import level_sizes
+from pipelines.neural_btf.network import Decoder, Encoder, decoder_arrays, encoder_vector
 from pipelines.neural_btf.principal_abrdfs import AbrdfSummary, summarise_abrdfs
 from pipelines.neural_btf.restoration import restoration_errors
+from pipelines.neural_btf.training.fine_tuning import QuantisedNetwork
 from pipelines.neural_btf.training.trainer import TrainedNetwork
+from storage.btf_file import BtfFile
 from storage.schemas import neural_btf as schemas
 from storage.versions import Slot, VersionedStore
 
@@ -66,7 +69,14 @@ def compressed() -> CompressedBtf:
     random = np.random.default_rng(1)
     latents = random.standard_normal((CLUSTERS, 8)).astype(np.float32)
     ids = random.integers(0, CLUSTERS, HEIGHT * WIDTH).astype(np.int32)
-    return CompressedBtf(decoder_arrays(Decoder()), latents, ids, 1.75, HEIGHT, WIDTH)
+    return CompressedBtf(
+        decoder_arrays(Decoder()), latents, ids, 1.75, HEIGHT, WIDTH, least=0.0, largest=1.0
+    )
+
+
+def file_of(btf: CompressedBtf) -> BtfFile:
+    """The paper's form."""
+    return BtfFile(btf.decoder, btf.latents, btf.height, btf.width, btf.alpha, btf.ids)
 
 
 def assert_same(one: Any, other: Any) -> None:
@@ -162,7 +172,8 @@ def test_a_trained_network_comes_back(residual: float | None) -> None:
     encoder(torch.randn(9, 225, 3))  # batch statistics that are not those of the beginning
     latents = np.random.default_rng(2).standard_normal((CLUSTERS, 8)).astype(np.float32)
     curve = np.arange(1, 4), np.array([0.5, 0.25, 0.125])
-    trained = TrainedNetwork(encoder.eval(), Decoder().eval(), latents, *curve, residual)
+    parallax = None if residual is None else np.ones((9, 2), np.float32)
+    trained = TrainedNetwork(encoder.eval(), Decoder().eval(), latents, parallax, *curve, residual)
     dataset = schemas.NEURAL_BTF.conform(datasets.neural_btf_dataset(trained))
     assert dataset.attrs["widths"] == [4, 6]
     back = datasets.trained_network_of(dataset, 225)
@@ -188,30 +199,65 @@ def test_a_compressed_btf_comes_back(compressed: CompressedBtf, clustered: bool)
     if not clustered:
         latents = compressed.latents[compressed.ids]
         compressed = dataclasses.replace(compressed, latents=latents, ids=None)
-    dataset = schemas.COMPRESSED_BTF.conform(datasets.compressed_btf_dataset(compressed))
-    assert ("ids" in dataset) == clustered
+    dataset = datasets.compressed_btf_dataset(file_of(compressed))
+    dataset = schemas.COMPRESSED_BTF.conform(dataset)
+    assert dataset.sizes["byte"] == dataset["file"].nbytes < compressed.payload_bytes + 400
     assert_same_btf(datasets.compressed_btf_of(dataset), compressed)
 
 
-def test_a_btf_is_packed_from_network_clusters_and_matrix(
+def groups_of(ids: NDArray[np.integer]) -> xr.Dataset:
+    groups = AbrdfClusters(ids, np.bincount(ids), None, np.zeros((CLUSTERS, 8), np.float32))
+    return datasets.abrdf_clusters_dataset(groups, (HEIGHT, WIDTH))
+
+
+def test_the_papers_form_is_put_together_from_network_clusters_and_matrix(
     btf_images: xr.Dataset, summary: AbrdfSummary, compressed: CompressedBtf
 ) -> None:
     trained = TrainedNetwork(
-        Encoder(225, (4,)), Decoder(), compressed.latents, np.arange(2), np.ones(2), None
+        Encoder(225, (4,)), Decoder(), compressed.latents, None, np.arange(2), np.ones(2), None
     )
-    network = datasets.neural_btf_dataset(trained)
-    ids = compressed.ids
-    assert ids is not None
-    groups = AbrdfClusters(ids, np.bincount(ids), None, np.zeros((CLUSTERS, 8), np.float32))
-    found = datasets.packed_btf(
-        network,
-        datasets.abrdf_clusters_dataset(groups, (HEIGHT, WIDTH)),
+    assert compressed.ids is not None
+    found = datasets.float_btf_file(
+        datasets.neural_btf_dataset(trained),
+        groups_of(compressed.ids),
         datasets.abrdf_matrix_dataset(summary, btf_images),
     )
     expected = dataclasses.replace(
         compressed, decoder=decoder_arrays(trained.decoder), alpha=summary.alpha
     )
-    assert_same_btf(found, expected)
+    assert_same_btf(datasets.runtime_btf(found), expected)
+
+
+def test_whole_numbers_become_the_values_that_they_stand_for(
+    btf_images: xr.Dataset, summary: AbrdfSummary, compressed: CompressedBtf
+) -> None:
+    random = np.random.default_rng(3)
+
+    def symbols(*shape: int) -> NDArray[np.int32]:
+        return random.integers(-9, 10, shape).astype(np.int32)
+
+    step = np.float32(0.25).reshape(())
+    decoder = {name: (symbols(*part.shape), step) for name, part in compressed.decoder.items()}
+    small = {
+        name: (symbols(*part.shape), step) for name, part in decoder_arrays(Decoder(4)).items()
+    }
+    steps = np.linspace(0.1, 0.8, 8, dtype=np.float32)
+    mips = tuple(symbols(rows * columns, 8) for rows, columns in level_sizes(HEIGHT, WIDTH)[1:])
+    network = QuantisedNetwork(
+        decoder, symbols(CLUSTERS, 8), steps, mips, steps / 2, None, small, np.arange(2), np.ones(2)
+    )
+    assert compressed.ids is not None
+    matrix = datasets.abrdf_matrix_dataset(summary, btf_images)
+    held = datasets.quantised_btf_file(network, groups_of(compressed.ids), matrix)
+    curve = network.curve_step, network.curve_rmse
+    dataset = schemas.COMPRESSED_BTF.conform(datasets.compressed_btf_dataset(held, curve))
+    found = datasets.compressed_btf_of(dataset)
+    np.testing.assert_array_equal(found.latents, network.latents.astype(np.float32) * steps)
+    np.testing.assert_array_equal(found.mips[1], mips[1].astype(np.float32) * (steps / 2))
+    np.testing.assert_array_equal(found.decoder["weight_2"], decoder["weight_2"][0] * step)
+    np.testing.assert_array_equal(found.by_student().decoder["bias_1"], small["bias_1"][0] * step)
+    np.testing.assert_array_equal(found.ids, compressed.ids)
+    assert (found.alpha, found.least, found.largest) == (summary.alpha, 0.0, 1.0)
 
 
 # ---- pictures --------------------------------------------------------------------------------
@@ -244,7 +290,8 @@ def test_a_stored_btf_is_loaded_without_torch(
 ) -> None:
     root: Path = tmp_path_factory.mktemp("store")
     store = VersionedStore(root)
-    dataset = schemas.COMPRESSED_BTF.conform(datasets.compressed_btf_dataset(compressed))
+    dataset = datasets.compressed_btf_dataset(file_of(compressed))
+    dataset = schemas.COMPRESSED_BTF.conform(dataset)
     record = {"settings": {}, "recipe": "", "checks": []}
     store.write(Slot("neural_btf", "compressed_btf", "5.knit"), dataset, record)
     code = f"""
