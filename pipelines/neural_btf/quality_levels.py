@@ -94,7 +94,7 @@ def restored_levels(compressed: CompressedBtf, pairs: Pairs) -> list[NDArray[np.
     for latents, (rows, columns) in zip(compressed.mips, level_sizes(*size)[1:], strict=False):
         shift = compressed.parallax
         if shift is not None:
-            shift = shift * np.float32([columns / size[1], rows / size[0]])
+            shift = shift * np.array([columns / size[1], rows / size[0]], np.float32)
         level = replace(
             compressed, latents=latents, ids=None, height=rows, width=columns, parallax=shift
         )

@@ -288,9 +288,9 @@ def test_a_photograph_counts_once() -> None:
 
 def test_pictures_are_exposed_by_what_was_measured() -> None:
     truth = np.random.default_rng(0).random((2, 12, 12, 3), np.float32)
-    dim = np.stack([truth[0], truth[1] * 0.01])
-    bright = picture_errors(dim, dim * 0.7)
-    alike = picture_errors(truth, truth * 0.7)
+    dim = np.stack([truth[0], truth[1] * np.float32(0.01)])
+    bright = picture_errors(dim, dim * np.float32(0.7))
+    alike = picture_errors(truth, truth * np.float32(0.7))
     for one, other in zip(bright, alike, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-3)
     assert (alike.flip > 0.05).all()

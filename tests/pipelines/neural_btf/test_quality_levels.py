@@ -105,5 +105,5 @@ def test_a_levels_parallax_is_the_finest_ones_in_its_own_texels() -> None:
     btf = CompressedBtf(
         decoder_arrays(Decoder()), np.zeros((64, 8), np.float32), None, 1.0, 8, 8, (coarse,), shift
     )
-    half = CompressedBtf(btf.decoder, coarse, None, 1.0, 4, 4, parallax=shift / 2)
+    half = CompressedBtf(btf.decoder, coarse, None, 1.0, 4, 4, parallax=shift / np.float32(2))
     np.testing.assert_allclose(restored_levels(btf, PAIRS)[0], half.photographs(PAIRS), atol=1e-6)
