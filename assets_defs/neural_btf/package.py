@@ -56,8 +56,27 @@ class BtfPackageSettings(PackageSettings):
 
 
 def _expected(version: StoredVersion) -> dict[str, Any]:
-    """Parts as the file in the store has them."""
-    return packed_numbers(btf_file_of(version.input("compressed_btf")))
+    """Parts as the file in the store has them: all that is of whole numbers, and their steps."""
+    import numpy as np
+
+    from storage.btf_file import Quantised, values_of
+
+    file = btf_file_of(version.input("compressed_btf"))
+    student = {f"student_{name}": part for name, part in file.student.items()}
+    tensors = {**file.decoder, **student, "latents": file.latents}
+    expected: dict[str, Any] = {
+        name: part.symbols.astype(np.int8) if isinstance(part, Quantised) else values_of(part)
+        for name, part in tensors.items()
+    }
+    if isinstance(file.latents, Quantised):
+        expected["latent_steps"] = file.latents.step
+    if file.mips:
+        expected["mips"] = np.concatenate([level.symbols for level in file.mips]).astype(np.int8)
+    if file.parallax is not None:
+        expected["parallax"] = file.parallax
+    if file.ids is not None:
+        expected["ids"] = file.ids.astype(np.min_scalar_type(len(expected["latents"]) - 1))
+    return expected
 
 
 @BTF.asset(
@@ -85,13 +104,13 @@ def btf_package(
     exposure = home_exposure(scenery, tiles)
     views = reference_views(scenery, tiles, exposure, settings.view_width)
     photograph = restored_images["original"].values[0]
-    numbers = packed_numbers(file)
-    values = numbers | _meshes(scenery) | _pictures(settings, scenery, exposure, views, photograph)
+    values = _values(file, scenery)
+    values |= _pictures(settings, scenery, exposure, views, photograph)
     parameters = packed_parameters(file) | {"tiles": tiles, "exposure": exposure}
     figures = _figures(keys, scenery.btf, restored_images, compressed_btf.sizes["byte"])
     about = Contents(_title(keys), [_source(settings, keys)], values, parameters)
     about = replace(about, views=[_view(view) for view in views], figures=figures, lineage=lineage)
-    content = write_package(package_schema(numbers), about)
+    content = write_package(package_schema(packed_numbers(file)), about)
     return package_dataset(content), {"bytes": len(content), "views": len(views)}
 
 
@@ -134,12 +153,13 @@ def packed_parameters(file: BtfFile) -> dict[str, Any]:
     return {"alpha": file.alpha, "height": file.height, "width": file.width, **bounds}
 
 
-def _meshes(scenery: Scenery) -> dict[str, Any]:
+def _values(file: BtfFile, scenery: Scenery) -> dict[str, Any]:
     from storage.packages import Mesh
 
     _, cloth, around = scenery
     assert around is not None
     return {
+        **packed_numbers(file),
         "cloth": Mesh(
             cloth.vertices,
             cloth.triangles,

@@ -1,4 +1,4 @@
-"""A compressed BTF for other programs: decoder as ONNX, arrays, latents as a texture."""
+"""A compressed BTF for other programs: its file, decoder as ONNX, arrays, latents as textures."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from tsuya.exports.format import Format, Notes
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from pipelines.neural_btf.compressed import CompressedBtf
 
 _SYSTEMS = ("neural_btf",)
 _LAYERS = (1, 2, 3, 4)
@@ -40,7 +42,7 @@ def write_onnx(package: Package, target: Path) -> Notes:
         opset_imports=[helper.make_opsetid("", _OPSET)],
         ir_version=_IR,
         producer_name="Tsuya",
-        doc_string="Radiance is alpha times the colour, where it is negative 0.",
+        doc_string="Radiance is alpha times the colour, held to least and largest, at least 0.",
     )
     helper.set_model_props(model, _about(package))
     onnx.checker.check_model(model, full_check=True)
@@ -49,35 +51,69 @@ def write_onnx(package: Package, target: Path) -> Notes:
 
 
 def write_safetensors(package: Package, target: Path) -> Notes:
-    """All arrays under the names of their parts; alpha, height, width in the header. Raises
-    BadInput."""
-    import numpy as np
+    """All numbers as float32 under the names of `compressed_arrays`; alpha, size and bounds in the
+    header. Raises BadInput."""
     from safetensors.numpy import save_file
 
-    names = [name for name in package.parts if package.meta["parts"][name]["kind"] == "array"]
-    arrays = {name: np.ascontiguousarray(package.array(name)) for name in names}
-    save_file(arrays, str(target), metadata=_about(package))
+    from tsuya.exports.packaged_btf import packaged_btf
+
+    save_file(compressed_arrays(packaged_btf(package)), str(target), metadata=_about(package))
     return ()
 
 
-def write_ktx2(package: Package, target: Path) -> Notes:
-    """Latents of each texel as an array texture of floats: layer 0 has the first four. Raises
-    BadInput."""
-    from storage.packages.ktx2 import ktx2_bytes
+def compressed_arrays(btf: CompressedBtf) -> dict[str, NDArray[Any]]:
+    """A runtime BTF's arrays by name.
 
-    target.write_bytes(ktx2_bytes(texel_latents(package)))
-    return ("Texels that share latents have them each: the file is larger than the package.",)
-
-
-def texel_latents(package: Package) -> NDArray[np.float32]:
-    """Latents of texels, (2, height, width, 4), row 0 at the top. Raises BadInput."""
+    ``weight_1`` … ``bias_4``, the same with ``student_`` before; ``latents`` (k, 8), ``ids``
+    (texel,) where texels share them; ``mips_1`` … (texel, 8); ``parallax`` (9, 2). What there is
+    not is left out.
+    """
     import numpy as np
 
-    latents = package.array("latents")
-    if "ids" in package.parts:
-        latents = latents[package.array("ids")]
-    size = (int(package.parameter("height")), int(package.parameter("width")))
-    return np.ascontiguousarray(np.moveaxis(latents.reshape(*size, 2, 4), 2, 0))
+    arrays: dict[str, Any] = {**btf.decoder, "latents": btf.latents}
+    arrays |= {f"student_{name}": part for name, part in (btf.student or {}).items()}
+    arrays |= {f"mips_{number}": level for number, level in enumerate(btf.mips, 1)}
+    arrays |= {} if btf.ids is None else {"ids": btf.ids}
+    arrays |= {} if btf.parallax is None else {"parallax": btf.parallax}
+    return {name: np.ascontiguousarray(part) for name, part in arrays.items()}
+
+
+def write_ktx2(package: Package, target: Path) -> Notes:
+    """A folder with latents of each level as an array texture of floats, `level_0.ktx2` …: layer 0
+    has the first four. Raises BadInput.
+
+    Not levels of one file: those of KTX 2 round sizes down, ours up, as all texels belong to one.
+    """
+    from storage.packages.ktx2 import ktx2_bytes
+    from tsuya.exports.packaged_btf import packaged_btf
+
+    target.mkdir(parents=True, exist_ok=True)
+    for number, level in enumerate(level_latents(packaged_btf(package))):
+        (target / f"level_{number}.ktx2").write_bytes(ktx2_bytes(level))
+    return ("Texels that share latents have them each: the files are larger than the package.",)
+
+
+def level_latents(btf: CompressedBtf) -> list[NDArray[np.float32]]:
+    """Latents of texels of each level, (2, height, width, 4), row 0 at the top."""
+    import numpy as np
+
+    from pipelines.neural_btf.latent_texture import level_sizes
+
+    tables = (btf.latents_of(slice(None)), *btf.mips)
+    sizes = level_sizes(btf.height, btf.width)[: len(tables)]
+    return [
+        np.ascontiguousarray(np.moveaxis(table.reshape(*size, 2, 4), 2, 0))
+        for table, size in zip(tables, sizes, strict=True)
+    ]
+
+
+def write_tbtf(package: Package, target: Path) -> Notes:
+    """The file that the package was made of, byte by byte (docs/btf_file.md). Raises BadInput."""
+    from storage.btf_file import write_btf_file
+    from tsuya.exports.packaged_btf import packaged_file
+
+    target.write_bytes(write_btf_file(packaged_file(package)))
+    return ()
 
 
 def _plane(name: str) -> list[Any]:
@@ -112,8 +148,9 @@ def _constants(package: Package) -> list[Any]:
     import numpy as np
     from onnx import numpy_helper
 
-    names = [f"{kind}_{layer}" for layer in _LAYERS for kind in ("weight", "bias")]
-    values: dict[str, Any] = {name: package.array(name) for name in names}
+    from tsuya.exports.packaged_btf import packaged_btf
+
+    values: dict[str, Any] = dict(packaged_btf(package).decoder)
     values |= {"zero": np.array([0]), "two": np.array([2]), "three": np.array([3])}
     values |= {"axis": np.array([1]), "one": np.array([1.0], np.float32)}
     return [numpy_helper.from_array(value, name) for name, value in values.items()]
@@ -121,7 +158,8 @@ def _constants(package: Package) -> list[Any]:
 
 def _about(package: Package) -> dict[str, str]:
     """What a reader must know, as texts."""
-    about = {name: str(package.parameter(name)) for name in ("alpha", "height", "width")}
+    names = ("alpha", "height", "width", "least", "largest")
+    about = {name: str(package.parameter(name)) for name in names}
     return about | {
         "title": str(package.meta["title"]),
         "source": json.dumps(package.meta["source"]),
@@ -134,7 +172,12 @@ def _about(package: Package) -> dict[str, str]:
 FORMATS = (
     Format("onnx", _SYSTEMS, ".onnx", "the decoder of a BTF as an ONNX model", write_onnx),
     Format(
-        "safetensors", _SYSTEMS, ".safetensors", "decoder, latents, index list", write_safetensors
+        "safetensors",
+        _SYSTEMS,
+        ".safetensors",
+        "decoder, latents of all levels, parallax as floats",
+        write_safetensors,
     ),
-    Format("ktx2", _SYSTEMS, ".ktx2", "latents of texels as a float texture", write_ktx2),
+    Format("ktx2", _SYSTEMS, "", "latents of texels as float textures, one a level", write_ktx2),
+    Format("tbtf", _SYSTEMS, ".tbtf", "the compressed BTF as its file", write_tbtf),
 )

@@ -48,8 +48,11 @@ export interface LiveView {
   setState(state: State): void;
   /** Called before a frame, e.g. to load tiles; what is loaded later calls `requestDraw`. */
   update?(camera: Camera): Promise<void> | void;
-  /** Draws linear radiance, background and all, into the target that is bound. */
-  draw(renderer: WebGLRenderer, camera: Camera, width: number, height: number): void;
+  /**
+   * Draws linear radiance, background and all, into the target that is bound; while something moves
+   * (`moving`), it may do so with less care.
+   */
+  draw(renderer: WebGLRenderer, camera: Camera, width: number, height: number, moving?: boolean): void;
   /** Where a person's motion of so many seconds brings the camera ("drive"). */
   move?(camera: Camera, motion: Motion, seconds: number): Camera;
   /** For the drawer: tiles resident, … */

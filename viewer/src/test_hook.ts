@@ -27,9 +27,9 @@ export const testHook = {
     live.change();
   },
 
-  /** A frame as the stage draws it: a PNG (RGBA) in base64. */
-  async capture(width: number, height: number, supersampling = 1): Promise<string> {
-    const frame = await shown().capture(width, height, supersampling);
+  /** A frame as the stage draws it: a PNG (RGBA) in base64; `moving`: as while something moves. */
+  async capture(width: number, height: number, supersampling = 1, moving = false): Promise<string> {
+    const frame = await shown().capture(width, height, supersampling, moving);
     const png = encode({ width, height, data: frame.data, channels: 4, depth: 8 });
     let text = "";
     for (let start = 0; start < png.length; start += 8192) {

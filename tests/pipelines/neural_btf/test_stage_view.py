@@ -146,9 +146,9 @@ def test_the_shader_decodes_as_torch_and_numpy_do(student: bool) -> None:
     assert np.abs(found - swapped).max() > 0.01
 
 
-def written_decoder() -> dict[str, NDArray[np.float32]]:
+def written_decoder(hidden: int) -> dict[str, NDArray[np.float32]]:
     """A decoder that a formula has, so that the viewer's test has the same."""
-    sizes = (12, 106, 106, 106, 3)
+    sizes = (12, hidden, hidden, hidden, 3)
     arrays: dict[str, NDArray[Any]] = {}
     for layer in range(1, 5):
         row, column = np.indices((sizes[layer], sizes[layer - 1]))
@@ -162,10 +162,12 @@ def test_the_viewers_test_knows_what_numpy_decodes() -> None:
     stored = json.loads((CHECKOUT / "viewer" / "tests" / "neural_btf.json").read_text())
     latents, light, view = (np.array(stored[key]) for key in ("latents", "light", "view"))
     inputs = direction_inputs_of_vectors(light, view)
-    for n, colour in enumerate(stored["colour"]):
-        found = decode_in_numpy(written_decoder(), latents[n : n + 1], inputs[n : n + 1])[0, 0]
-        np.testing.assert_allclose(found, colour, atol=1e-5)
-    assert np.ptp(stored["colour"]) > 0.5
+    for hidden, key in ((HIDDEN, "colour"), (STUDENT_HIDDEN, "student_colour")):
+        arrays = written_decoder(hidden)
+        for n, colour in enumerate(stored[key]):
+            found = decode_in_numpy(arrays, latents[n : n + 1], inputs[n : n + 1])[0, 0]
+            np.testing.assert_allclose(found, colour, atol=1e-5)
+        assert np.ptp(stored[key]) > 0.5
 
 
 def test_weights_and_latents_are_all_in_the_texels() -> None:

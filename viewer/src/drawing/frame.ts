@@ -121,10 +121,12 @@ interface Encoding {
   size?: [number, number];
 }
 
-/** A rectangle of a target: rows from `bottom` up to `top`. */
-export interface Rows {
-  bottom: number;
-  top: number;
+/** What `Frames.draw` draws: rows from `bottom` up to `top`, all without them. */
+export interface Drawing {
+  bottom?: number;
+  top?: number;
+  /** As of `LiveView.draw`. */
+  moving?: boolean;
 }
 
 /** Draws frames of one live view. */
@@ -144,16 +146,16 @@ export class Frames {
   constructor(private readonly renderer: THREE.WebGLRenderer) {}
 
   /** Draws a picture's radiance, or some of its rows, and keeps it. */
-  draw(view: LiveView, camera: Camera, width: number, height: number, rows?: Rows): THREE.WebGLRenderTarget {
+  draw(view: LiveView, camera: Camera, width: number, height: number, how: Drawing = {}): THREE.WebGLRenderTarget {
     if (this.target?.width !== width || this.target.height !== height) {
       if (this.target) disposeTarget(this.target);
       this.target = makeTarget(this.renderer, width, height);
     }
-    const { bottom, top } = rows ?? { bottom: 0, top: height };
+    const { bottom = 0, top = height, moving } = how;
     this.target.scissor.set(0, bottom, width, top - bottom);
     this.target.scissorTest = true;
     this.renderer.setRenderTarget(this.target);
-    view.draw(this.renderer, camera, width, height);
+    view.draw(this.renderer, camera, width, height, moving);
     return this.target;
   }
 
@@ -188,13 +190,13 @@ export class Frames {
     return this.sum;
   }
 
-  /** A frame as the stage draws it. */
-  capture(view: LiveView, camera: Camera, width: number, height: number, supersampling: number): Frame {
+  /** A frame as the stage draws it, `supersampling` samples beside and below each other a pixel. */
+  capture(view: LiveView, camera: Camera, [width, height]: [number, number], supersampling: number, moving: boolean): Frame {
     const n = supersampling;
     const large = makeTarget(this.renderer, width * n, height * n);
     const small = new THREE.WebGLRenderTarget(width, height, { depthBuffer: false });
     this.renderer.setRenderTarget(large);
-    view.draw(this.renderer, camera, width * n, height * n);
+    view.draw(this.renderer, camera, width * n, height * n, moving);
     this.encode(large, small, { side: n });
     const codes = new Uint8Array(width * height * 4);
     this.renderer.readRenderTargetPixels(small, 0, 0, width, height, codes);

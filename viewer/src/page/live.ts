@@ -110,9 +110,9 @@ export class Live {
   }
 
   /** A frame of the first view as the stage draws it, with all that it loads. */
-  async capture(width: number, height: number, supersampling: number): Promise<Frame> {
+  async capture(width: number, height: number, supersampling: number, moving = false): Promise<Frame> {
     await this.view.update?.(this.camera);
-    return this.panes[0].frames.capture(this.view, this.camera, width, height, supersampling);
+    return this.panes[0].frames.capture(this.view, this.camera, [width, height], supersampling, moving);
   }
 
   /** Ends the drawing and frees what it holds. */
@@ -153,7 +153,7 @@ export class Live {
     const size = this.sizeAt(this.scale);
     const camera = this.cameraAt(size[0], [0, 0]);
     const begun = performance.now();
-    this.show(this.panes.map(({ view, frames }) => frames.draw(view, camera, ...size)), 1);
+    this.show(this.panes.map(({ view, frames }) => frames.draw(view, camera, ...size, { moving: true })), 1);
     await this.finished();
     this.frameTime = performance.now() - begun;
     this.onFrame();

@@ -1,4 +1,7 @@
-/** A hanging cloth of a neural BTF, decoded at each pixel, under a light that is dragged. */
+/**
+ * A hanging cloth of a neural BTF, decoded at each pixel, under a light that is dragged. While
+ * something moves, the student decodes, where there is one.
+ */
 
 import * as THREE from "three";
 import { eyeOf, type Camera } from "../drawing/camera";
@@ -6,16 +9,18 @@ import { drawScene } from "../drawing/scene";
 import { Surface } from "../drawing/surface";
 import { texture } from "../drawing/textures";
 import type { Bounds, LiveView, State, SystemViewer } from "../live_view";
+import type { MeshData } from "../package/mesh";
 import type { Package } from "../package/package";
-import { LAYERS, latentTexels, upsideDown, weightTexels, type Layer } from "./neural_btf/decoder_texels";
+import { float } from "../shaders";
+import { latentTexels, upsideDown, vectorsOf, weightTexels, type Layer } from "./neural_btf/decoder_texels";
+import { packedBtf, type PackedBtf } from "./neural_btf/packed_btf";
 import { CONTROLS, withState, type Settings } from "./neural_btf/state";
 
-/** What a package says of itself, for the drawer. */
-interface Material {
-  texels: [number, number];
-  latents: number;
-  /** What the decoder's colours are multiplied with, at exposure 0. */
-  scale: number;
+/** The cloth by one of a package's decoders. */
+interface DecodedCloth {
+  surface: Surface;
+  /** For the drawer. */
+  decoder: string;
 }
 
 class HangingCloth implements LiveView {
@@ -24,14 +29,20 @@ class HangingCloth implements LiveView {
   readonly controls = CONTROLS;
   private readonly scene = new THREE.Scene();
   private readonly room: Bounds;
+  private drawn: DecodedCloth;
 
   constructor(
-    private readonly cloth: Surface,
+    private readonly whole: DecodedCloth,
+    private readonly student: DecodedCloth | undefined,
     private readonly around: Surface,
-    private readonly material: Material,
+    private readonly btf: PackedBtf,
+    /** What the decoder's colours are multiplied with, at exposure 0. */
+    private readonly scale: number,
     private settings: Settings,
   ) {
-    this.scene.add(cloth, around);
+    this.drawn = whole;
+    for (const { surface } of this.cloths) this.scene.add(surface);
+    this.scene.add(around);
     around.geometry.computeBoundingSphere();
     const { center, radius } = around.geometry.boundingSphere as THREE.Sphere;
     this.room = { centre: center.toArray(), radius };
@@ -45,41 +56,47 @@ class HangingCloth implements LiveView {
     this.settings = withState(this.settings, state);
   }
 
-  draw(renderer: THREE.WebGLRenderer, camera: Camera, width: number, height: number): void {
+  draw(renderer: THREE.WebGLRenderer, camera: Camera, width: number, height: number, moving = false): void {
     const { light, tiles, exposure } = this.settings;
-    const { uniforms } = this.cloth;
+    this.drawn = (moving && this.student) || this.whole;
+    for (const cloth of this.cloths) cloth.surface.visible = cloth === this.drawn;
+    const { uniforms } = this.drawn.surface;
     uniforms.light.value.set(...light);
     uniforms.eye.value.copy(eyeOf(camera));
     uniforms.tiles.value = tiles;
-    uniforms.scale.value = this.material.scale * 2 ** exposure;
+    uniforms.scale.value = this.scale * 2 ** exposure;
     drawScene(renderer, this.scene, camera, [width, height], this.room);
   }
 
   figures(): Record<string, number | string> {
-    const { texels, latents } = this.material;
-    return { texels: `${texels[0]} × ${texels[1]}`, "latent vectors": latents };
+    const { texels, vectors, levels } = this.btf;
+    return {
+      "decoded by": this.drawn.decoder,
+      texels: `${texels[0]} × ${texels[1]}`,
+      "latent vectors": vectors,
+      "levels of latents": levels,
+    };
   }
 
   dispose(): void {
-    this.cloth.dispose();
+    for (const { surface } of this.cloths) surface.dispose();
     this.around.dispose();
+  }
+
+  private get cloths(): DecodedCloth[] {
+    return this.student ? [this.whole, this.student] : [this.whole];
   }
 }
 
-async function clothOf(pkg: Package, [columns, rows]: [number, number], latents: Float32Array): Promise<Surface> {
-  const numbers = LAYERS.slice(1).map((_, n) => n + 1);
-  const [mesh, owners, ...layers] = await Promise.all([
-    pkg.mesh("cloth"),
-    pkg.has("ids") ? pkg.floats("ids") : undefined,
-    ...numbers.map((n): Promise<Layer> => layerOf(pkg, n)),
-  ]);
-  const lines = { weights: weightTexels(layers), latentVectors: latentTexels(latents) };
-  const shared = owners && { owners: { width: columns, height: rows, channels: 1, data: owners } };
-  const textures = Object.entries({ ...lines, ...shared }).map(([name, picture]): [string, THREE.Texture] => [
-    name,
-    texture(upsideDown(picture), { interpolate: false }),
-  ]);
-  return new Surface({
+function clothOf(
+  mesh: MeshData,
+  btf: PackedBtf,
+  layers: Layer[],
+  latentVectors: THREE.Texture,
+  who: string,
+): DecodedCloth {
+  const weights = texture(upsideDown(weightTexels(layers)), { interpolate: false });
+  const surface = new Surface({
     vertices: mesh.vertices,
     triangles: mesh.triangles,
     attributes: {
@@ -90,14 +107,19 @@ async function clothOf(pkg: Package, [columns, rows]: [number, number], latents:
     vertex: "btf_cloth_vertex.glsl",
     fragment: "btf_cloth_fragment.glsl",
     values: {
-      SHARED: owners !== undefined,
-      TEXELS: [columns, rows],
+      VECTORS: vectorsOf(layers),
+      TEXELS: btf.texels,
+      LEVELS: btf.levels,
+      PARALLAX: btf.parallax,
+      LEAST: float(btf.least),
+      LARGEST: float(btf.largest),
+      PLACES: false,
       TILES: "tiles",
       LIGHT: "light",
       EYE: "eye",
       SCALE: "scale",
     },
-    textures: Object.fromEntries(textures),
+    textures: { weights, latentVectors },
     uniforms: {
       light: { type: "vec3", value: new THREE.Vector3() },
       eye: { type: "vec3", value: new THREE.Vector3() },
@@ -105,11 +127,7 @@ async function clothOf(pkg: Package, [columns, rows]: [number, number], latents:
       scale: { type: "float", value: 1 },
     },
   });
-}
-
-async function layerOf(pkg: Package, n: number): Promise<Layer> {
-  const [weight, bias] = await Promise.all([pkg.floats(`weight_${n}`), pkg.floats(`bias_${n}`)]);
-  return { weight, bias };
+  return { surface, decoder: `${who}, 3 × ${layers[0].bias.length} neurons` };
 }
 
 async function roomOf(pkg: Package): Promise<Surface> {
@@ -127,17 +145,14 @@ async function roomOf(pkg: Package): Promise<Surface> {
 const viewer: SystemViewer = {
   name: "neural_btf",
   async make(pkg) {
-    const texels: [number, number] = [pkg.parameter("width"), pkg.parameter("height")];
-    const latents = await pkg.floats("latents");
-    const [cloth, around] = await Promise.all([clothOf(pkg, texels, latents), roomOf(pkg)]);
-    const material = {
-      texels,
-      latents: latents.length / 8,
-      scale: pkg.parameter("alpha") * pkg.parameter("exposure"),
-    };
+    const [btf, mesh, around] = await Promise.all([packedBtf(pkg), pkg.mesh("cloth"), roomOf(pkg)]);
+    const latents = texture(upsideDown(latentTexels(btf.latents)), { interpolate: false });
+    const whole = clothOf(mesh, btf, btf.decoder, latents, "the whole decoder");
+    const student = btf.student && clothOf(mesh, btf, btf.student, latents, "its student");
     const inFront: Settings = { light: [0, -1, 0], tiles: pkg.parameter("tiles"), exposure: 0 };
     const settings = withState(inFront, pkg.meta.views[0]?.state ?? {});
-    return new HangingCloth(cloth, around, material, settings);
+    const scale = btf.alpha * pkg.parameter("exposure");
+    return new HangingCloth(whole, student, around, btf, scale, settings);
   },
 };
 

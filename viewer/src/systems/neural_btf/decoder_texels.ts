@@ -1,12 +1,8 @@
-/** The decoder and the latents as textures, as `pipelines/neural_btf/stage_view.py` has them. */
+/** Decoders and latents as textures, as `pipelines/neural_btf/stage_view.py` has them. */
 
 import type { Picture } from "../../package/package";
 
-/** Layers of the decoder: inputs, three times neurons, channels. */
-export const LAYERS = [12, 106, 106, 106, 3] as const;
 const FOUR = 4;
-const VECTORS = Math.ceil(106 / FOUR);
-const COLUMNS = VECTORS * FOUR + 1;
 const LONGEST_ROW = 2048;
 
 /** A layer's weights (outputs, inputs) and biases. */
@@ -15,26 +11,33 @@ export interface Layer {
   bias: Float32Array;
 }
 
+/** Vectors of four neurons of a hidden layer: `VECTORS` of `btf_decoder.glsl`. */
+export function vectorsOf(layers: readonly Layer[]): number {
+  return Math.ceil(layers[0].bias.length / FOUR);
+}
+
 /**
  * All layers: a row is four neurons, a column an input, the last column the bias. What pads layers
  * is 0. Row 0 is the first.
  */
 export function weightTexels(layers: readonly Layer[]): Picture<Float32Array> {
-  const height = VECTORS * (layers.length - 1) + 1;
-  const data = new Float32Array(height * COLUMNS * FOUR);
+  const vectors = vectorsOf(layers);
+  const width = vectors * FOUR + 1;
+  const height = vectors * (layers.length - 1) + 1;
+  const data = new Float32Array(height * width * FOUR);
   layers.forEach(({ weight, bias }, layer) => {
-    const inputs = LAYERS[layer];
-    for (let neuron = 0; neuron < LAYERS[layer + 1]; neuron++) {
-      const row = VECTORS * layer + Math.floor(neuron / FOUR);
-      const at = (column: number) => (row * COLUMNS + column) * FOUR + (neuron % FOUR);
+    const inputs = weight.length / bias.length;
+    for (let neuron = 0; neuron < bias.length; neuron++) {
+      const row = vectors * layer + Math.floor(neuron / FOUR);
+      const at = (column: number) => (row * width + column) * FOUR + (neuron % FOUR);
       for (let input = 0; input < inputs; input++) data[at(input)] = weight[neuron * inputs + input];
-      data[at(COLUMNS - 1)] = bias[neuron];
+      data[at(width - 1)] = bias[neuron];
     }
   });
-  return { width: COLUMNS, height, channels: FOUR, data };
+  return { width, height, channels: FOUR, data };
 }
 
-/** Latents (k, 8) as lines of texels, two texels a vector. */
+/** Latents (n, 8) as lines of texels, two texels a vector. */
 export function latentTexels(latents: Float32Array): Picture<Float32Array> {
   const texels = latents.length / FOUR;
   const width = Math.min(texels, LONGEST_ROW);
