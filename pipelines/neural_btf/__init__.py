@@ -13,7 +13,8 @@ method:
    networks in torch, ``decoder_arrays`` the decoder's size, inputs and values in NumPy,
    ``abrdf_pool`` the part of the matrix that is in memory.
 4. ``compressed``: what is kept, and what it decodes to (``CompressedBtf``); ``restoration``: its
-   errors against all photographs (``restoration_errors``).
+   errors against all photographs (``restoration_errors``); ``quality``: figures of it and of any
+   rival (``quality``), beside what knows nothing; ``quality_levels``: of far views.
 5. ``draping``: a draped cloth of the material under a sky (``draw_frames``); ``material``: what
    else such a picture can be of; ``importance``: directions of light drawn as a material needs.
 
