@@ -80,11 +80,13 @@ class ViewerPage:
         """Set ``camera``, ``state``, or both, as a view of `meta.json` has them."""
         self.evaluate("view => window.tsuya.setView(view)", view)
 
-    def capture(self, width: int, height: int, supersampling: int = 1) -> NDArray[np.uint8]:
-        """A frame as the stage draws it, (height, width, 3)."""
+    def capture(
+        self, width: int, height: int, supersampling: int = 1, *, moving: bool = False
+    ) -> NDArray[np.uint8]:
+        """A frame as the stage draws it, (height, width, 3); ``moving``: as while things move."""
         import cv2
 
-        asked = [width, height, supersampling]
+        asked = [width, height, supersampling, moving]
         text = self.evaluate("asked => window.tsuya.capture(...asked)", asked)
         coded = np.frombuffer(base64.b64decode(text), np.uint8)
         bgra: Any = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED)

@@ -1,4 +1,4 @@
-"""Where on a material a point of a surface lies, and how it is seen and lit there.
+"""How a point of a surface is seen and lit in the material's frame.
 
 The same as the shader `btf_directions.glsl`.
 """
@@ -10,18 +10,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.neural_btf.compressed import CompressedBtf
-
 MOST_THETA = math.radians(75.0)
 """Goniometers measure so far; beyond, the value there is taken, dimmed with the cosine."""
-
-
-def texels_at(uvs: NDArray[np.floating], compressed: CompressedBtf) -> NDArray[np.int64]:
-    """Texel numbers at texture coordinates (n, 2); a tile's v = 0 is its bottom row's edge."""
-    u, v = np.mod(uvs.astype(np.float64), 1.0).T
-    column = np.minimum((u * compressed.width).astype(np.int64), compressed.width - 1)
-    row = np.minimum(((1.0 - v) * compressed.height).astype(np.int64), compressed.height - 1)
-    return row * compressed.width + column
 
 
 def surface_frames(

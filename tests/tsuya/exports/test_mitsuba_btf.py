@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
 
+from assets_defs.neural_btf.datasets import runtime_btf
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import Camera, orbit
 from pipelines.geometry.meshes import grid_triangles
@@ -24,7 +25,10 @@ from pipelines.neural_btf.draping.scene import camera_rays, scene_of, seen
 from pipelines.neural_btf.material import surface_radiance
 from pipelines.neural_btf.surface_lookup import in_frames
 from pipelines.neural_btf.training.plan import TrainingPlan
+from storage.btf_file import write_btf_file
 from storage.packages import Mesh
+from tests.btf_packages import random_file
+from tests.storage.btf_file.page_decoder import PageFile
 from tests.tsuya.exports.bsdf_sampling import draw, integrate, interaction, mitsuba, p_value
 from tsuya.exports.mitsuba.btf import plug_in_arrays, write_btf_folder
 
@@ -107,11 +111,9 @@ def test_values_are_the_decoders(bsdf: Any) -> None:
         unit_vectors(np.stack([np.arccos(rng.uniform(0.27, 1, 40)), rng.uniform(0, 6.28, 40)], -1))
         for _ in range(2)
     )
-    uvs = rng.random((40, 2))
-    column = np.floor(uvs[:, 0] * 2 % 1 * btf.width).astype(int)
-    row = btf.height - 1 - np.floor(uvs[:, 1] * 2 % 1 * btf.height).astype(int)
-    expected = np.maximum(btf.radiance(row * btf.width + column, light, view), 0) / np.pi
-    swapped = np.maximum(btf.radiance(row * btf.width + column, view, light), 0) / np.pi
+    uvs = rng.uniform(-1.5, 1.5, (40, 2))
+    expected = np.maximum(btf.radiance_at(2 * uvs, light, view), 0) / np.pi
+    swapped = np.maximum(btf.radiance_at(2 * uvs, view, light), 0) / np.pi
     context = mi.BSDFContext()
     found = np.array(
         [
@@ -123,6 +125,26 @@ def test_values_are_the_decoders(bsdf: Any) -> None:
     assert not np.allclose(found, swapped, atol=1e-2)
     below = interaction(-view[0])
     assert not np.array(bsdf.eval(context, below, mi.Vector3f(*light[0]))).any()
+
+
+def test_values_are_those_of_the_page_of_the_file(tmp_path: Path) -> None:
+    mi, file, rng = mitsuba(), random_file(), np.random.default_rng(2)
+    page = PageFile(write_btf_file(file))
+    np.savez(tmp_path / "data.npz", **plug_in_arrays(runtime_btf(file)))
+    plugged = mi.load_dict({"type": "tsuya_btf", "filename": str(tmp_path / "data.npz")})
+    found, expected = [], []
+    for _ in range(40):
+        light, view = unit_vectors(np.stack([rng.uniform(0, 1.3, 2), rng.uniform(0, 6, 2)], -1))
+        uv = rng.uniform(-1.5, 1.5, 2)
+        value = plugged.eval(mi.BSDFContext(), interaction(view, uv=uv), mi.Vector3f(*light))
+        found.append(np.array(value) * np.pi)
+        expected.append(page.radiance((float(uv[0]), float(uv[1])), light, view))
+    assert np.allclose(found, expected, atol=2e-4)
+    # Its nulls: bounds hold some and leave some; values differ from place to place.
+    bounds = file.alpha * np.array([[file.least], [file.largest]])
+    held = np.isclose(np.ravel(expected), bounds).any(axis=0).mean()
+    assert 0.02 < held < 0.9
+    assert not np.allclose(found, np.roll(expected, 1, axis=0), atol=0.1)
 
 
 def folded_sheet(tiles: float, aspect: float) -> DrapedCloth:
@@ -148,15 +170,13 @@ def folded_sheet(tiles: float, aspect: float) -> DrapedCloth:
 def drawn_sheet(
     btf: CompressedBtf, sheet: DrapedCloth, camera: Camera, size: tuple[int, int], light: Any
 ) -> Any:
-    """Radiance (y, x, 3) of texels' middles under a directional light, 16 rays a pixel."""
+    """Radiance (y, x, 3) under a directional light, 16 rays a pixel."""
     y, x = np.divmod(np.arange(16 * size[0] * size[1]), 4 * size[0])
     ways = camera_rays(camera, size, (np.stack([x, y], axis=-1) + 0.5) / 4)
     which, sights = seen(scene_of(sheet), camera, ways)
-    steps = np.array([btf.width, btf.height])
-    middles = (np.floor(sights.places * steps) + 0.5) / steps
     towards = in_frames(sights.frame, np.broadcast_to(light, (len(which), 3)))
     fine = np.zeros((len(ways), 3))
-    fine[which] = surface_radiance(btf, middles, towards, sights.view)
+    fine[which] = surface_radiance(btf, sights.places, towards, sights.view)
     return fine.reshape(size[1], 4, size[0], 4, 3).mean(axis=(1, 3))
 
 

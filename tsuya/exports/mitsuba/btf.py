@@ -64,6 +64,7 @@ def write_btf(package: Package, target: Path) -> Notes:
     return (
         "Scalar variants of Mitsuba alone: the decoder goes through Python, some 0.1 ms a ray.",
         "Mitsuba casts the cloth's shadows on itself, which the stage does not.",
+        "Latents are looked up at the finest level, whatever a pixel sees: take samples.",
         "Below 75 degrees, where nothing was measured, the value there is taken, dimmed with the "
         "light's cosine.",
     )
@@ -95,12 +96,14 @@ def write_btf_folder(
 def plug_in_arrays(btf: CompressedBtf) -> dict[str, Any]:
     """What `tsuya_btf.py` reads."""
     from pipelines.neural_btf.importance import importance_table
+    from pipelines.neural_btf.latent_texture import MONOMIALS
 
-    ids = np.arange(btf.texels) if btf.ids is None else btf.ids
+    latents = btf.latents_of(slice(None))
     return {
         **{name: values.astype(np.float32) for name, values in btf.decoder.items()},
-        "latents": btf.latents,
-        "ids": ids.reshape(btf.height, btf.width).astype(np.int32),
+        "latents": latents.reshape(btf.height, btf.width, latents.shape[1]),
+        "parallax": np.zeros((MONOMIALS, 2), np.float32) if btf.parallax is None else btf.parallax,
         "alpha": np.float32(btf.alpha),
+        "bounds": np.array([btf.least, btf.largest], np.float32),
         "shares": importance_table(btf).shares,
     }

@@ -8,10 +8,13 @@
 ``tiles`` repeats the material so often over a unit of the shape's texture coordinates, of which u
 goes along the material's x. ``filename`` holds decoder, latents and the table for sampling:
 
-- The decoder says the radiance of a texel under a directional light that would give a white
-  Lambertian surface the cosine of its angle: pi f cos(theta) of the BRDF f. Where it says less
-  than 0, that is 0. Directions lower than 75 degrees, which no goniometer measured, are taken at
-  75 degrees, and the light is dimmed with its cosine.
+- ``latents`` (row, column, 8) are a texture that repeats, row 0 at the top, bilinear between the
+  middles of texels; a view looks them up ``parallax`` beside a place: a polynomial of the view's
+  place on the stereographic plane, in columns and rows.
+- The decoder says the radiance under a directional light that would give a white Lambertian surface
+  the cosine of its angle: pi f cos(theta) of the BRDF f. Over alpha it is held to ``bounds``, and
+  where it is less than 0, that is 0. Directions lower than 75 degrees, which no goniometer
+  measured, are taken at 75 degrees, and the light is dimmed with its cosine.
 - ``shares`` (view row, view column, light row, light column): how much of the light goes where, of
   the material's mean, for cells of equal area of the disc below the hemisphere: row sin²(theta),
   column phi. A cell is drawn by its share, then a point of it evenly. So the density is
@@ -43,6 +46,12 @@ def lifted(x: float, y: float, z: float) -> tuple[float, float, float]:
     return level * x, level * y, LEAST_COSINE
 
 
+def place(direction: Any) -> tuple[float, float]:
+    """Of a direction, lifted, on the stereographic plane."""
+    x, y, z = lifted(*direction)
+    return x / (1.0 + z), y / (1.0 + z)
+
+
 class Btf:
     """What `data.npz` holds, asked for one direction at a time."""
 
@@ -51,29 +60,40 @@ class Btf:
             self.layers = [
                 (arrays[f"weight_{number}"], arrays[f"bias_{number}"]) for number in range(1, 5)
             ]
-            self.latents, self.ids = arrays["latents"], arrays["ids"]
+            self.latents, self.parallax = arrays["latents"], arrays["parallax"]
             self.alpha = float(arrays["alpha"])
+            self.least, self.largest = arrays["bounds"].tolist()
             shares = arrays["shares"].astype(np.float64)
-        self.height, self.width = self.ids.shape
+        self.height, self.width = self.latents.shape[:2]
         self.view_cells, self.light_cells = shares.shape[:2], shares.shape[2:]
         flat = shares.reshape(*self.view_cells, -1)
         self.shares = flat / flat.sum(axis=-1, keepdims=True)
         self.summed = self.shares.cumsum(axis=-1)
 
     def radiance(self, u: float, v: float, light: Any, view: Any) -> Any:
-        """Of the texel at (u, v), v upwards: (3,), for directions (x, y, z) above the surface."""
-        column = min(int((u - math.floor(u)) * self.width), self.width - 1)
-        row = self.height - 1 - min(int((v - math.floor(v)) * self.height), self.height - 1)
-        values = np.empty(12, np.float32)
-        values[:8] = self.latents[self.ids[row, column]]
-        for start, direction in ((8, light), (10, view)):
-            x, y, z = lifted(*direction)
-            values[start : start + 2] = x / (1.0 + z), y / (1.0 + z)
+        """At (u, v), v upwards: (3,), for directions (x, y, z) above the surface."""
+        towards = place(light), place(view)
+        values = np.concatenate([self.latents_at(u, v, *towards[1]), *towards]).astype(np.float32)
         for weight, bias in self.layers[:-1]:
             values = np.maximum(weight @ values + bias, 0.0)
         weight, bias = self.layers[-1]
         dimmed = self.alpha * min(light[2] / LEAST_COSINE, 1.0)
-        return dimmed * np.maximum(weight @ values + bias, 0.0)
+        colour = np.clip(weight @ values + bias, self.least, self.largest)
+        return dimmed * np.maximum(colour, 0.0)
+
+    def latents_at(self, u: float, v: float, x: float, y: float) -> Any:
+        """(8,) at (u, v), from a view at (x, y) of the stereographic plane."""
+        terms = [x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3]
+        across, down = np.array(terms) @ self.parallax
+        column = u * self.width - 0.5 + float(across)
+        row = (1.0 - v) * self.height - 0.5 + float(down)
+        left, top = math.floor(column), math.floor(row)
+        right, below = column - left, row - top
+        left, top = left % self.width, top % self.height
+        beside, under = (left + 1) % self.width, (top + 1) % self.height
+        upper = self.latents[top, left] * (1 - right) + self.latents[top, beside] * right
+        lower = self.latents[under, left] * (1 - right) + self.latents[under, beside] * right
+        return upper * (1 - below) + lower * below
 
     def density(self, light: Any, view: Any) -> float:
         """Per steradian, with which `drawn` returns a light."""
@@ -164,7 +184,7 @@ class TsuyaBtf(mi.BSDF):
     def to_string(self) -> str:
         """As Mitsuba prints it."""
         size = f"{self.btf.width} x {self.btf.height} texels"
-        return f"TsuyaBtf[{size}, {len(self.btf.latents)} latents, tiles = {self.tiles:g}]"
+        return f"TsuyaBtf[{size}, tiles = {self.tiles:g}]"
 
 
 mi.register_bsdf("tsuya_btf", TsuyaBtf)
