@@ -27,8 +27,9 @@ def random_decoder(random: np.random.Generator, hidden: int) -> dict[str, Quanti
         weights = random.normal(0, 40, (outputs, inputs)).round().clip(-127, 127)
         biases = random.integers(20, 60, outputs) if layer == 4 else random.integers(-9, 9, outputs)
         for name, symbols, step in (("weight", weights, width / 40), ("bias", biases, 0.01)):
-            symbols = symbols.astype(np.int32)
-            tensors[f"{name}_{layer}"] = Quantised(symbols, np.array(step, np.float32))
+            tensors[f"{name}_{layer}"] = Quantised(
+                np.asarray(symbols, np.int32), np.array(step, np.float32)
+            )
     return tensors
 
 
@@ -61,7 +62,8 @@ def random_file(*, shared: bool = False, seed: int = 4, size: tuple[int, int] = 
 def float_file(*, shared: bool = False, seed: int = 4) -> BtfFile:
     """The paper's form of such a file: float32, no coarser levels, no student."""
     file = runtime_btf(random_file(shared=shared, seed=seed))
-    return BtfFile(file.decoder, file.latents, file.height, file.width, file.alpha, file.ids)
+    ids = None if file.ids is None else np.asarray(file.ids, np.int32)
+    return BtfFile(file.decoder, file.latents, file.height, file.width, file.alpha, ids)
 
 
 def btf_package(file: BtfFile, *, width: int | None = None, tiles: float = 1.0) -> Package:
