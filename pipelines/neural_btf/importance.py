@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 VIEW_CELLS = (6, 12)
 LIGHT_CELLS = (12, 24)
-_SAMPLES = 32
+_SAMPLES = 16
 _EVEN = 0.1
 """Part of the light that every cell has, so that no direction is left out where a texel differs
 from the others."""
