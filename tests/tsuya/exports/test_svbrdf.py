@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from assets_defs.neural_btf.package import packed_numbers, packed_parameters
 from pipelines.light.directions import all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf.decoder_arrays import direction_inputs
 from pipelines.neural_btf.svbrdf_fit import svbrdf_errors
+from storage.btf_file import BtfFile
 from tests.tsuya.exports.test_mitsuba_btf import cloth
 from tsuya.exports import materialx, svbrdf
 from tsuya.exports.packaged_btf import packaged_btf
@@ -32,10 +34,10 @@ class Stand:
             "title": "cloth <6 & 8>",
             "figures": [{"name": "RMSE over alpha", "value": 0.0123}],
         }
-        self.values = {**btf.decoder, "latents": btf.latents}
-        self.parameters = {
-            "alpha": btf.alpha, "height": 6, "width": 8, "tiles": 2.0,
-            "roughness": 0.5, "refractive_index": 1.4,
+        file = BtfFile(btf.decoder, btf.latents, 6, 8, btf.alpha, parallax=btf.parallax)
+        self.values = packed_numbers(file)
+        self.parameters = packed_parameters(file) | {
+            "tiles": 2.0, "roughness": 0.5, "refractive_index": 1.4,
         }  # fmt: skip
         x, y = (axis.ravel() for axis in np.meshgrid(corner, corner))
         flat = np.stack([x, y, 0.1 * x * y], axis=1).astype(np.float32)
