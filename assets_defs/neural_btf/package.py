@@ -60,6 +60,7 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
     import numpy as np
 
     from storage.btf_file import Quantised, values_of
+    from storage.packages.neural_btf import TENSORS
 
     file = btf_file_of(version.input("compressed_btf"))
     student = {f"student_{name}": part for name, part in file.student.items()}
@@ -68,9 +69,15 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
         name: part.symbols.astype(np.int8) if isinstance(part, Quantised) else values_of(part)
         for name, part in tensors.items()
     }
+    for prefix, decoder in (("", file.decoder), ("student_", file.student)):
+        found = [part.step for part in decoder.values() if isinstance(part, Quantised)]
+        if len(found) == len(TENSORS):
+            in_order = [tuple(decoder).index(name) for name in TENSORS]
+            expected[f"{prefix}steps"] = np.array(found)[in_order]
     if isinstance(file.latents, Quantised):
         expected["latent_steps"] = file.latents.step
     if file.mips:
+        expected["mip_steps"] = file.mips[0].step
         expected["mips"] = np.concatenate([level.symbols for level in file.mips]).astype(np.int8)
     if file.parallax is not None:
         expected["parallax"] = file.parallax

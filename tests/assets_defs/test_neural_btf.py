@@ -259,8 +259,8 @@ def _light_from_behind(
     return right(material, places, light * [-1, -1, 1] if is_wrong else light, *more)
 
 
-def _next_latents(right: Callable[..., Any], scenery: Any) -> Any:
-    values = right(scenery)
+def _next_latents(right: Callable[..., Any], *given: Any) -> Any:
+    values = right(*given)
     return values | {"latents": np.roll(values["latents"], 1, axis=0)}
 
 
