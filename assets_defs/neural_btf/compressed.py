@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -24,7 +25,9 @@ from assets_defs.neural_btf.network import stored_training_data
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Pictures, Progress, Result
 from pipelines.neural_btf import figures, file_figures
-from pipelines.neural_btf.decoder_arrays import direction_inputs
+from pipelines.neural_btf.clusters import warm_start
+from pipelines.neural_btf.decoder_arrays import LATENTS, direction_inputs
+from pipelines.neural_btf.representatives import cluster_means, cluster_members
 from pipelines.neural_btf.training.plan import FineTuningPlan, TrainingPlan
 from storage.btf_file import Quantised, read_texel, write_btf_file
 from storage.schemas import neural_btf as schemas
@@ -47,8 +50,14 @@ class FileSettings(Settings):
     form: Literal["quantised", "float32"] = Field(
         "quantised", description="quantised: trained on, knowing it; float32: the paper's, as it is"
     )
-    bits: float = Field(
-        3.9, gt=0.5, le=16.0, description="Quantised: mean bits a number of decoder and latents"
+    latents: int = Field(
+        24, ge=8, le=32, multiple_of=4, description="Quantised: latents a texel; 8 in the network"
+    )
+    share: float = Field(
+        0.155,
+        gt=0.03,
+        le=1.0,
+        description="Quantised: bytes over those of the paper's decoder and latents",
     )
     file_steps: int = Field(150, ge=1, description="Quantised: steps of gradient descent")
     file_rate: float = Field(0.003, gt=0.0, le=1.0, description="Quantised: learning rate")
@@ -105,10 +114,11 @@ def _curve_pictures(dataset: xr.Dataset) -> Pictures:
 # ---- compressed_btf --------------------------------------------------------------------------
 
 
-def fine_tuning_plan(settings: FileSettings) -> FineTuningPlan:
+def fine_tuning_plan(settings: FileSettings, clusters: int, texels: int) -> FineTuningPlan:
     """The plan that the settings describe."""
+    index = math.ceil(math.log2(clusters)) * texels / 8 if clusters < texels else 0.0
     return FineTuningPlan(
-        bits=settings.bits,
+        file_bytes=settings.share * figures.table_bytes(clusters, clusters) + index,
         steps=settings.file_steps,
         rate=settings.file_rate,
         seed=settings.file_seed,
@@ -133,6 +143,14 @@ def quantised_network(
     views = np.unique(data.directions[:, 2:], axis=0, return_inverse=True)[1].ravel()
     coarse = averaged_abrdfs(abrdf_reader(abrdf_matrix), data.size, views, budget=_MIP_BYTES)
 
+    clusters, texels = abrdf_clusters.sizes["cluster"], abrdf_clusters.sizes["texel"]
+    plan = fine_tuning_plan(settings, clusters, texels)
+    scores = cluster_means(
+        abrdf_matrix["scores"].values,
+        cluster_members(abrdf_clusters["ids"].values, clusters),
+    )
+    more = warm_start(scores, settings.latents)[:, LATENTS:]
+
     def file_bytes(network: QuantisedNetwork) -> int:
         return len(write_btf_file(quantised_btf_file(network, abrdf_clusters, abrdf_matrix)))
 
@@ -140,8 +158,9 @@ def quantised_network(
         return fine_tune(
             data,
             trained_network_of(neural_btf, len(data.directions)),
+            more,
             coarse,
-            fine_tuning_plan(settings),
+            plan,
             file_bytes,
             resume=work.read(),
             keep=work.keep,

@@ -33,16 +33,16 @@ class AbrdfClusters(NamedTuple):
     """(k, 8) where fast training starts the latents."""
 
 
-def warm_start(scores: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Latents (k, 8) from principal components (k, r): the first 8, each with deviation 1.
+def warm_start(scores: NDArray[np.floating], count: int = LATENTS) -> NDArray[np.float32]:
+    """Latents (k, count) from principal components (k, r): the first ones, each with deviation 1.
 
     Where there are fewer components, or one is the same everywhere, latents are 0.
 
     >>> warm_start(np.array([[3.0], [5.0]]))[:, :2].tolist()
     [[-1.0, 0.0], [1.0, 0.0]]
     """
-    latents = np.zeros((len(scores), LATENTS), np.float32)
-    used = scores[:, :LATENTS].astype(np.float64)
+    latents = np.zeros((len(scores), count), np.float32)
+    used = scores[:, :count].astype(np.float64)
     deviation = used.std(axis=0)
     varies = deviation > 1e-9 * max(float(deviation.max(initial=0.0)), 1e-30)
     centred = used - used.mean(axis=0)

@@ -75,12 +75,13 @@ class Encoder(nn.Module):
 class Decoder(nn.Module):
     """12 inputs (8 latents, light, view on the stereographic plane), 3 x 106 neurons, RGB.
 
-    ``hidden``: neurons of a hidden layer, 106 in the paper; a student has fewer.
+    ``hidden``: neurons of a hidden layer, 106 in the paper; ``latents``: 8 in the paper.
     """
 
-    def __init__(self, hidden: int = HIDDEN) -> None:
+    def __init__(self, hidden: int = HIDDEN, latents: int = LATENTS) -> None:
         super().__init__()
-        self.first = nn.Linear(LATENTS + DIRECTIONS, hidden)
+        self.latents = latents
+        self.first = nn.Linear(latents + DIRECTIONS, hidden)
         self.second = nn.Linear(hidden, hidden)
         self.third = nn.Linear(hidden, hidden)
         self.last = nn.Linear(hidden, 3)
@@ -100,8 +101,8 @@ class Decoder(nn.Module):
         The first layer is a sum of what the latents and what the directions bring; both are
         computed once, not for every combination.
         """
-        of_latents = latents @ self.first.weight[:, :LATENTS].T
-        of_directions = directions @ self.first.weight[:, LATENTS:].T + self.first.bias
+        of_latents = latents @ self.first.weight[:, : self.latents].T
+        of_directions = directions @ self.first.weight[:, self.latents :].T + self.first.bias
         summed = of_latents[:, None] + of_directions[None]
         colours = self._after_first(summed.flatten(0, 1))
         return colours.reshape(len(latents), len(directions), 3)
@@ -109,8 +110,8 @@ class Decoder(nn.Module):
     def grid_by_view(self, latents: Tensor, directions: Tensor) -> Tensor:
         """RGB over alpha, (texel, view * light, 3): latents (texel, view, 8), which differ by the
         view, with pairs of directions (view, light, 4)."""
-        of_latents = latents @ self.first.weight[:, :LATENTS].T
-        of_directions = directions @ self.first.weight[:, LATENTS:].T + self.first.bias
+        of_latents = latents @ self.first.weight[:, : self.latents].T
+        of_directions = directions @ self.first.weight[:, self.latents :].T + self.first.bias
         summed = of_latents[:, :, None] + of_directions[None]
         colours = self._after_first(summed.flatten(0, 2))
         return colours.reshape(len(latents), -1, 3)
@@ -137,7 +138,8 @@ def decoder_arrays(decoder: Decoder) -> dict[str, NDArray[np.float32]]:
 
 def decoder_of(arrays: DecoderArrays) -> Decoder:
     """The decoder of arrays named as `decoder_arrays` names them."""
-    decoder = Decoder(len(arrays["bias_1"]))
+    neurons, inputs = arrays["weight_1"].shape
+    decoder = Decoder(neurons, inputs - DIRECTIONS)
     with torch.no_grad():
         for number, layer in enumerate(decoder.layers, start=1):
             for kind, part in (("weight", layer.weight), ("bias", layer.bias)):

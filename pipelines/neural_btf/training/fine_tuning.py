@@ -27,6 +27,7 @@ from pipelines.neural_btf.network import Decoder, decoder_arrays, decoder_of, de
 from pipelines.neural_btf.training.batches import Batches
 from pipelines.neural_btf.training.data import TrainingData
 from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
+from pipelines.neural_btf.training.latent_price import LatentPrice
 from pipelines.neural_btf.training.optimisers import (
     adam,
     decoder_optimisers,
@@ -52,19 +53,22 @@ _ASK_EVERY = 50
 """Steps between questions for the file's true bytes."""
 
 
+_Levels = tuple[list[Tensor], list[Tensor | None]]
+
+
 class QuantisedNetwork(NamedTuple):
     """A network in whole numbers; values are symbols times steps."""
 
     decoder: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
     """Symbols and step () of ``weight_1``, ``bias_1`` …"""
     latents: NDArray[np.int32]
-    """(k, 8)."""
+    """(k, n)."""
     latent_steps: NDArray[np.float32]
-    """(8,)."""
+    """(n,)."""
     mips: tuple[NDArray[np.int32], ...]
-    """Coarser levels, each (texel, 8)."""
+    """Coarser levels, each (texel, n)."""
     mip_steps: NDArray[np.float32]
-    """(8,)."""
+    """(n,)."""
     parallax: NDArray[np.float32] | None
     """(9, 2)."""
     student: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
@@ -77,6 +81,7 @@ class QuantisedNetwork(NamedTuple):
 def fine_tune(
     data: TrainingData,
     trained: TrainedNetwork,
+    more: NDArray[np.float32],
     coarse: AveragedAbrdfs,
     plan: FineTuningPlan,
     file_bytes: Callable[[QuantisedNetwork], int],
@@ -87,10 +92,11 @@ def fine_tune(
 ) -> QuantisedNetwork:
     """Quantise a trained network of the same data, and train it on.
 
+    ``more`` (k, n): where further latents start; the decoder does not heed them at first.
     ``file_bytes`` tells how large a network's file is: asked for now and then. ``keep`` gets the
     state every 15 seconds; ``resume`` is such a state.
     """
-    tuning = FineTuning(data, trained, coarse, plan, file_bytes)
+    tuning = FineTuning(data, trained, more, coarse, plan, file_bytes)
     if resume is not None:
         tuning.restore(resume)
     kept = time.monotonic()
@@ -111,6 +117,7 @@ class FineTuning:
         self,
         data: TrainingData,
         trained: TrainedNetwork,
+        more: NDArray[np.float32],
         coarse: AveragedAbrdfs,
         plan: FineTuningPlan,
         file_bytes: Callable[[QuantisedNetwork], int],
@@ -122,15 +129,17 @@ class FineTuning:
         self._directions = torch.from_numpy(data.directions).to(self._device)
         self._sizes = level_sizes(*data.size)[1:]
         self._has_parallax = trained.parallax is not None
-        self.decoder = _quantised_decoder(decoder_of(decoder_arrays(trained.decoder)))
+        self.decoder = _quantised_decoder(_widened(trained.decoder, more.shape[1]))
         self.decoder.to(self._device).train()
         parallax = np.zeros((9, 2), np.float32) if trained.parallax is None else trained.parallax
         self.parallax = self._parameter(parallax)
-        self.latents = self._parameter(trained.latents)
-        self.mips = self._parameter(_coarse_latents(trained.latents, data))
+        latents = np.concatenate([trained.latents, more], axis=1)
+        self.latents = self._parameter(latents)
+        self.mips = self._parameter(_coarse_latents(latents, data))
         self.of_latents = self._quantiser(self.latents, "latents")
         self.of_mips = self._quantiser(self.mips, "mips")
-        self.student = _quantised_decoder(Decoder(STUDENT_HIDDEN)).to(self._device).train()
+        self.student = _quantised_decoder(Decoder(STUDENT_HIDDEN, latents.shape[1]))
+        self.student.to(self._device).train()
         weights, small = _originals(self.decoder), _originals(self.student)
         self._optimisers = [
             *decoder_optimisers(weights, [self.latents, self.mips], plan.rate),
@@ -139,13 +148,11 @@ class FineTuning:
             adam(self._log_steps(), _STEP_RATE),
         ]
         self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
+        self._latent_price = LatentPrice(self.latents.shape[1], 2, self._device)
         self.steps_done = 0
         self._price, self._true_share = _FIRST_PRICE, 1.0
         self._curve: list[tuple[int, float]] = []
         self._squares, self._count = 0.0, 0
-        parts = (*weights.values(), *small.values(), self.latents, self.mips)
-        numbers = sum(part.numel() for part in parts)
-        self.wanted_bytes = plan.bits * numbers / 8
 
     # ---- a step ------------------------------------------------------------------------------
 
@@ -178,7 +185,7 @@ class FineTuning:
         """Dearer while the file is too large, cheaper while it is too small."""
         if self.steps_done % _ASK_EVERY == 0:
             self._true_share = self._file_bytes(self.result()) * 8 / bits
-        over = bits * self._true_share / (8 * self.wanted_bytes) - 1.0
+        over = bits * self._true_share / (8 * self._plan.file_bytes) - 1.0
         self._price *= math.exp(_PRICE_RATE * max(-1.0, min(1.0, 10.0 * over)))
 
     def _note(self, error: float) -> None:
@@ -236,23 +243,48 @@ class FineTuning:
         return error(self.decoder), error(self.student)
 
     def _bits(self) -> Tensor:
-        total = self.of_latents.bits(self.latents) + self.of_mips.bits(self.mips)
+        """What decoders and latents take in the file."""
+        total = torch.zeros((), device=self._device)
         for decoder in (self.decoder, self.student):
             for quantiser, original in _quantised_parts(decoder).values():
                 total = total + quantiser.bits(original)
+        finest, coarse = self._whole_levels()
+        if not self._data.is_textured:
+            total = total + self.of_latents.bits(self.latents)
+        for group, (levels, parents) in enumerate((coarse, finest)):
+            if levels:
+                if self.steps_done % _ASK_EVERY == 0:
+                    self._latent_price.fit(group, levels, parents)
+                total = total + self._latent_price.bits(group, levels, parents)
         return total
+
+    def _whole_levels(self) -> tuple[_Levels, _Levels]:
+        """Whole numbers (row, column, 8) of the finest and of the coarser levels, and of what is
+        over each; none where texels share latents, or where there are no coarser levels."""
+        table, ends = self.of_mips.whole(self.mips), self._level_ends()
+        coarse = [
+            table[first:last].reshape(*size, -1)
+            for size, first, last in zip(self._sizes, [0, *ends[:-1]], ends, strict=True)
+        ]
+        over: list[Tensor | None] = [*coarse[1:], None]
+        if not self._data.is_textured:
+            return ([], []), (coarse, over[: len(coarse)])
+        finest = self.of_latents.whole(self.latents).reshape(*self._data.size, -1)
+        return ([finest], [coarse[0] if coarse else None]), (coarse, over[: len(coarse)])
+
+    def _level_ends(self) -> list[int]:
+        return np.cumsum([rows * columns for rows, columns in self._sizes], dtype=int).tolist()
 
     # ---- result ------------------------------------------------------------------------------
 
     def result(self) -> QuantisedNetwork:
         """What has been learnt so far, in whole numbers."""
         symbols = self.of_mips.symbols(self.mips)
-        ends = np.cumsum([rows * columns for rows, columns in self._sizes], dtype=np.int64)
         return QuantisedNetwork(
             _symbols(self.decoder),
             self.of_latents.symbols(self.latents),
             self.of_latents.steps(),
-            tuple(np.split(symbols, ends[:-1])) if self._sizes else (),
+            tuple(np.split(symbols, self._level_ends()[:-1])) if self._sizes else (),
             self.of_mips.steps(),
             self.parallax.detach().cpu().numpy().copy() if self._has_parallax else None,
             _symbols(self.student),
@@ -271,6 +303,7 @@ class FineTuning:
                 "decoder": self.decoder.state_dict(),
                 "student": self.student.state_dict(),
                 "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
+                "coefficients": self._latent_price.coefficients,
                 "position": [self.steps_done, self._count],
                 "price": [self._price, self._true_share, self._squares],
                 "curve": self._curve,
@@ -289,6 +322,7 @@ class FineTuning:
                 part.copy_(saved["trained"][name])
         for optimiser, state in zip(self._optimisers, saved["optimisers"], strict=True):
             optimiser.load_state_dict(state)
+        self._latent_price.coefficients = saved["coefficients"]
         self.steps_done, self._count = saved["position"]
         self._price, self._true_share, self._squares = saved["price"]
         self._curve = [(int(step), float(value)) for step, value in saved["curve"]]
@@ -314,6 +348,15 @@ class FineTuning:
         both = (_quantised_parts(part).values() for part in (self.decoder, self.student))
         parts = [quantiser for decoder in both for quantiser, _ in decoder]
         return [part.log_step for part in (*parts, self.of_latents, self.of_mips)]
+
+
+def _widened(decoder: Decoder, more: int) -> Decoder:
+    """A copy that takes so many more latents, and does not heed them yet."""
+    arrays = decoder_arrays(decoder)
+    of_latents, of_directions = np.split(arrays["weight_1"], [decoder.latents], axis=1)
+    nothing = np.zeros((len(of_latents), more), np.float32)
+    wider = np.concatenate([of_latents, nothing, of_directions], axis=1)
+    return decoder_of({**arrays, "weight_1": wider})
 
 
 def _quantised_decoder(decoder: Decoder) -> Decoder:

@@ -71,8 +71,8 @@ class TrainingPlan:
 class FineTuningPlan:
     """How a trained network is trained on, knowing that it is rounded (`fine_tuning`)."""
 
-    bits: float = 3.9
-    """Mean bits that a number of decoder and latents may take in the file."""
+    file_bytes: float
+    """How large the file is to be."""
     steps: int = 250
     rate: float = 0.003
     """Largest learning rate of the cycle."""

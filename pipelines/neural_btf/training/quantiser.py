@@ -47,12 +47,11 @@ class Quantiser(nn.Module):
 
     def bits(self, values: Tensor) -> Tensor:
         """What all numbers take together if a normal distribution a channel codes them."""
-        scaled = (values / self.step).reshape(-1, len(self.log_step))
-        centred = scaled - scaled.mean(dim=0)
-        deviation = centred.std(dim=0, correction=0) + _LEAST_DEVIATION
-        upper, lower = (centred + 0.5) / deviation, (centred - 0.5) / deviation
-        chance = 0.5 * (torch.erf(upper * math.sqrt(0.5)) - torch.erf(lower * math.sqrt(0.5)))
-        return -torch.log2(chance.clamp_min(_LEAST_CHANCE)).sum()
+        return normal_bits((values / self.step).reshape(-1, len(self.log_step)))
+
+    def whole(self, values: Tensor) -> Tensor:
+        """The whole numbers as floats; gradients pass the rounding."""
+        return self(values) / self.step
 
     def symbols(self, values: Tensor) -> NDArray[np.int32]:
         """The whole numbers, in the values' shape."""
@@ -63,3 +62,15 @@ class Quantiser(nn.Module):
     def steps(self) -> NDArray[np.float32]:
         """(channel,) or (1,) in NumPy."""
         return self.step.detach().cpu().numpy().astype(np.float32)
+
+
+def normal_bits(numbers: Tensor, rounding: float = 0.0) -> Tensor:
+    """Bits of numbers (n, channel), rounded, that a normal distribution a channel codes.
+
+    ``rounding``: variance that rounding elsewhere adds to what is coded.
+    """
+    centred = numbers - numbers.mean(dim=0)
+    deviation = torch.sqrt(centred.square().mean(dim=0) + rounding + _LEAST_DEVIATION**2)
+    upper, lower = (centred + 0.5) / deviation, (centred - 0.5) / deviation
+    chance = 0.5 * (torch.erf(upper * math.sqrt(0.5)) - torch.erf(lower * math.sqrt(0.5)))
+    return -torch.log2(chance.clamp_min(_LEAST_CHANCE)).sum()

