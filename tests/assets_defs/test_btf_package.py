@@ -13,6 +13,7 @@ from assets_defs.neural_btf import package as assets
 from assets_defs.neural_btf.datasets import compressed_btf_dataset
 from assets_defs.packages import differing_parts
 from storage.btf_file import BtfFile, Quantised, write_btf_file
+from storage.readers.bad_input import BadInput
 from tests.btf_packages import btf_package, float_file, random_file
 from tsuya.exports.packaged_btf import packaged_file
 
@@ -46,6 +47,13 @@ def test_the_file_comes_out_of_its_package_byte_by_byte(name: str) -> None:
     package = btf_package(file)
     assert differing_parts(package, expected(file)) == []
     assert write_btf_file(packaged_file(package)) == write_btf_file(file)
+
+
+def test_a_package_of_another_schema_is_refused() -> None:
+    package = btf_package(FILES["each"])
+    package.meta["schema"] = 1
+    with pytest.raises(BadInput, match=r"^felt\.tsuya: schema is 1; expected 2, as this Tsuya"):
+        packaged_file(package)
 
 
 def _next_texels(file: BtfFile) -> BtfFile:

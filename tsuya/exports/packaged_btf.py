@@ -28,8 +28,12 @@ def packaged_file(package: Package) -> BtfFile:
     import numpy as np
 
     from storage.btf_file import BtfFile
-    from storage.packages.neural_btf import STUDENT
+    from storage.packages.neural_btf import PACKAGE, STUDENT
+    from storage.readers.bad_input import BadInput
 
+    if package.meta["schema"] != PACKAGE.number:
+        expected = f"{PACKAGE.number}, as this Tsuya makes them: make the package again"
+        raise BadInput(package.name, "schema", f"{package.meta['schema']}", expected)
     height, width = (int(package.parameter(name)) for name in ("height", "width"))
     has = package.parts
     return BtfFile(

@@ -31,6 +31,7 @@ class Stand:
     def __init__(self) -> None:
         btf, corner = cloth(), np.linspace(-1, 1, SIDE)
         self.meta = {
+            "schema": 2,
             "title": "cloth <6 & 8>",
             "figures": [{"name": "RMSE over alpha", "value": 0.0123}],
         }

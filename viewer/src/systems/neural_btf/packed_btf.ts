@@ -4,6 +4,8 @@ import { BadPackage } from "../../package/bad_package";
 import type { Package } from "../../package/package";
 import type { Layer } from "./decoder_texels";
 
+/** Of `storage/packages/neural_btf.py`. */
+const SCHEMA = 2;
 const LATENTS = 8;
 const DIRECTIONS = 4;
 const LAYERS = [1, 2, 3, 4];
@@ -44,6 +46,9 @@ export function levelTexels(columns: number, rows: number): number[] {
 
 /** Reads all of it. Throws BadPackage for numbers that do not belong together. */
 export async function packedBtf(pkg: Package): Promise<PackedBtf> {
+  if (pkg.meta.schema !== SCHEMA) {
+    throw new BadPackage(pkg.name, "schema", `${pkg.meta.schema}`, `${SCHEMA}: make the package again`);
+  }
   const columns = pkg.parameter("width");
   const rows = pkg.parameter("height");
   const [vectors, owners, coarser, decoder, student, parallax] = await Promise.all([
