@@ -182,6 +182,7 @@ export class Live {
         const targets = await this.drawStrips(this.sizeAt(scale), [0, 0], generation);
         if (!targets) return;
         this.show(targets, 1);
+        this.onFrame();
       }
       for (let sample = 0; sample < SAMPLES_A_SIDE ** 2; sample++) {
         const targets = await this.drawStrips(this.size(), shiftOf(sample), generation);
