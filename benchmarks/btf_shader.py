@@ -57,7 +57,7 @@ def _latents(
     views: NDArray[np.float32],
     footprint: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Latents (n, 8) at places (n, 2) in tiles."""
+    """Latents (n, c) at places (n, 2) in tiles."""
     parallax = np.zeros((9, 2)) if btf.parallax is None else btf.parallax
     across, down = (parallax_terms(views) @ parallax).T
     size = btf.height, btf.width
@@ -68,7 +68,7 @@ def _latents(
 
 
 def _decoded(decoder: DecoderArrays, values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """RGB over alpha (n, 3) of inputs (n, 12)."""
+    """RGB over alpha (n, 3) of inputs (n, c + 4)."""
     found = values.astype(np.float64)
     for layer in range(1, LAYERS + 1):
         found = found @ decoder[f"weight_{layer}"].T.astype(np.float64) + decoder[f"bias_{layer}"]

@@ -17,9 +17,9 @@ SIZE = (6, 5)
 SHARED = 9
 
 
-def random_decoder(random: np.random.Generator, hidden: int) -> dict[str, Quantised]:
+def random_decoder(random: np.random.Generator, hidden: int, latents: int) -> dict[str, Quantised]:
     """Whole numbers whose colours are bright, and differ."""
-    sizes = (12, hidden, hidden, hidden, 3)
+    sizes = (latents + 4, hidden, hidden, hidden, 3)
     tensors = {}
     for layer in range(1, 5):
         inputs, outputs = sizes[layer - 1], sizes[layer]
@@ -33,7 +33,9 @@ def random_decoder(random: np.random.Generator, hidden: int) -> dict[str, Quanti
     return tensors
 
 
-def random_file(*, shared: bool = False, seed: int = 4, size: tuple[int, int] = SIZE) -> BtfFile:
+def random_file(
+    *, shared: bool = False, seed: int = 4, size: tuple[int, int] = SIZE, channels: int = 8
+) -> BtfFile:
     """All that a file can hold: whole numbers, coarser levels, parallax, bounds, a student.
 
     ``shared``: texels share nine latent vectors, and there is no parallax.
@@ -42,11 +44,11 @@ def random_file(*, shared: bool = False, seed: int = 4, size: tuple[int, int] = 
     texels = size[0] * size[1]
 
     def latents(count: int, steps: np.ndarray) -> Quantised:
-        return Quantised(random.integers(-20, 21, (count, 8)).astype(np.int32), steps)
+        return Quantised(random.integers(-20, 21, (count, channels)).astype(np.int32), steps)
 
-    steps, coarse = random.uniform(0.02, 0.05, (2, 8)).astype(np.float32)
+    steps, coarse = random.uniform(0.02, 0.05, (2, channels)).astype(np.float32)
     return BtfFile(
-        random_decoder(random, HIDDEN),
+        random_decoder(random, HIDDEN, channels),
         latents(SHARED if shared else texels, steps),
         *size,
         1.75,
@@ -55,7 +57,7 @@ def random_file(*, shared: bool = False, seed: int = 4, size: tuple[int, int] = 
         parallax=None if shared else random.normal(0, 0.4, (9, 2)).astype(np.float32),
         least=0.125,
         largest=1.5,
-        student=random_decoder(random, STUDENT_HIDDEN),
+        student=random_decoder(random, STUDENT_HIDDEN, channels),
     )
 
 

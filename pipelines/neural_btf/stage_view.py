@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface, texture
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.decoder_arrays import LAYERS, DecoderArrays
+from pipelines.neural_btf.decoder_arrays import DIRECTIONS, LAYERS, DecoderArrays
 from pipelines.neural_btf.hanging_cloth import HangingCloth, Surroundings
 from pipelines.neural_btf.latent_texture import MONOMIALS
 
@@ -55,13 +55,17 @@ def weight_texels(decoder: DecoderArrays) -> NDArray[np.float32]:
     A row is four neurons, a column an input, the last column the bias. What pads layers is 0.
     """
     vectors = decoder_vectors(decoder)
+    latents = decoder["weight_1"].shape[1] - DIRECTIONS
     texels = np.zeros((vectors * (LAYERS - 1) + 1, vectors * _FOUR + 1, _FOUR), np.float32)
     for layer in range(1, LAYERS + 1):
         weight, bias = decoder[f"weight_{layer}"], decoder[f"bias_{layer}"]
         outputs, inputs = weight.shape
+        columns = np.arange(inputs)
+        if layer == 1:
+            columns[latents:] += -latents % _FOUR
         rows = -(-outputs // _FOUR)
         padded = np.zeros((rows * _FOUR, texels.shape[1]), np.float32)
-        padded[:outputs, :inputs] = weight
+        padded[:outputs, columns] = weight
         padded[:outputs, -1] = bias
         first = vectors * (layer - 1)
         texels[first : first + rows] = padded.reshape(rows, _FOUR, -1).transpose(0, 2, 1)
@@ -69,12 +73,13 @@ def weight_texels(decoder: DecoderArrays) -> NDArray[np.float32]:
 
 
 def latent_texels(latents: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Latents (n, 8) as lines of texels (y, x, 4), two texels a vector."""
-    columns = min(2 * len(latents), _LONGEST_ROW)
-    rows = -(-2 * len(latents) // columns)
-    texels = np.zeros((rows * columns, _FOUR), np.float32)
-    texels[: 2 * len(latents)] = latents.reshape(-1, _FOUR)
-    return texels.reshape(rows, columns, _FOUR)
+    """Latents (n, c) as lines of texels (y, x, 4), c / 4 texels a vector, padded by 0."""
+    count, width = latents.shape
+    vectors = -(-width // _FOUR)
+    a_row = min(count, _LONGEST_ROW // vectors)
+    texels = np.zeros((-(-count // a_row) * a_row, vectors * _FOUR), np.float32)
+    texels[:count, :width] = latents
+    return texels.reshape(-1, a_row * vectors, _FOUR)
 
 
 def material_values(btf: CompressedBtf) -> dict[str, Any]:
@@ -84,6 +89,7 @@ def material_values(btf: CompressedBtf) -> dict[str, Any]:
     parallax = np.zeros((MONOMIALS, 2)) if btf.parallax is None else btf.parallax
     return {
         "VECTORS": decoder_vectors(btf.decoder),
+        "LATENT_VECTORS": -(-btf.latents.shape[1] // _FOUR),
         "TEXELS": [btf.width, btf.height],
         "LEVELS": 1 + len(btf.mips),
         "PARALLAX": parallax.astype(float).ravel().tolist(),

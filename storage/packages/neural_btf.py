@@ -38,7 +38,7 @@ bilinear between four texels. A pixel that sees n² of the material's area, in t
 log2(n max(`height`, `width`)), held to 0 and the last, linear between two levels; without `mips`
 level 0.
 
-**Decoder.** Inputs are the 8 latents, the light's place, the view's place: 12 numbers. Three times
+**Decoder.** Inputs are the latents, the light's place, the view's place. Three times
 x := max(`weight_n` x + `bias_n`, 0), then `weight_4` x + `bias_4`, held to `least` and `largest`,
 is RGB over `alpha`. The radiance is `alpha` times that and the dimming, where it is negative 0. It
 stands for a light that gives a white matt surface, where it falls straight, the radiance 1. The
@@ -79,8 +79,8 @@ PACKAGE = PackageSchema(
     {
         **_decoder(),
         "latents": ArrayPart(
-            ("vector", "latent"), "int8", "step", "Latent vectors; float32 in the paper's form",
-            "table 1",
+            ("vector", "latent"), "int8", "step",
+            "Latent vectors; the paper's form is float32, of 8 latents", "table 1",
         ),
         "latent_steps": ArrayPart(("latent",), "float32", "1", "Steps of `latents`"),
         "ids": ArrayPart(

@@ -18,7 +18,7 @@ from tests.btf_packages import btf_package, float_file, random_file
 from tsuya.exports.packaged_btf import packaged_file
 
 FILES = {
-    "each": random_file(),
+    "each": random_file(channels=24),
     "shared": random_file(shared=True),
     "paper": float_file(shared=True),
 }
@@ -81,7 +81,7 @@ CHANGES: dict[str, tuple[Callable[[BtfFile], BtfFile], list[str]]] = {
     "parallax": (lambda file: replace(file, parallax=np.ones((9, 2), np.float32)), ["parallax"]),
     "steps of weights": (_twice_the_step, ["steps"]),
     "student": (
-        lambda file: replace(file, student=random_file(seed=5).student),
+        lambda file: replace(file, student=random_file(seed=5, channels=24).student),
         [f"student_{kind}_{layer}" for kind in ("bias", "weight") for layer in range(1, 5)],
     ),
 }

@@ -25,7 +25,7 @@ LEAST_PSNR = 40.0
 WIDTH = 32
 SMALL = (WIDTH, 24)
 FILES: dict[str, Callable[[], BtfFile]] = {
-    "each": lambda: random_file(size=(12, 16)),
+    "each": lambda: random_file(size=(12, 16), channels=22),
     "shared": lambda: random_file(shared=True),
     "paper": float_file,
 }

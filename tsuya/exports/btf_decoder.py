@@ -24,15 +24,16 @@ _OPSET, _IR = 17, 8
 def write_onnx(package: Package, target: Path) -> Notes:
     """The decoder as an ONNX model for any number n of samples.
 
-    Inputs: ``latents`` (n, 8); ``light`` and ``view``, (n, 3) unit vectors in the texture's frame,
+    Inputs: ``latents`` (n, c); ``light`` and ``view``, (n, 3) unit vectors in the texture's frame,
     z >= 0. Output: ``colour`` (n, 3), linear RGB over alpha. Raises BadInput.
     """
     import onnx
     from onnx import TensorProto, helper
 
+    channels = int(package.array("latents").shape[1])
     inputs = [
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["n", width])
-        for name, width in (("latents", 8), ("light", 3), ("view", 3))
+        for name, width in (("latents", channels), ("light", 3), ("view", 3))
     ]
     output = helper.make_tensor_value_info("colour", TensorProto.FLOAT, ["n", 3])
     nodes = [*_plane("light"), *_plane("view"), *_network()]
@@ -64,8 +65,8 @@ def write_safetensors(package: Package, target: Path) -> Notes:
 def compressed_arrays(btf: CompressedBtf) -> dict[str, NDArray[Any]]:
     """A runtime BTF's arrays by name.
 
-    ``weight_1`` … ``bias_4``, the same with ``student_`` before; ``latents`` (k, 8), ``ids``
-    (texel,) where texels share them; ``mips_1`` … (texel, 8); ``parallax`` (9, 2). What there is
+    ``weight_1`` … ``bias_4``, the same with ``student_`` before; ``latents`` (k, c), ``ids``
+    (texel,) where texels share them; ``mips_1`` … (texel, c); ``parallax`` (9, 2). What there is
     not is left out.
     """
     import numpy as np
@@ -79,8 +80,8 @@ def compressed_arrays(btf: CompressedBtf) -> dict[str, NDArray[Any]]:
 
 
 def write_ktx2(package: Package, target: Path) -> Notes:
-    """A folder with latents of each level as an array texture of floats, `level_0.ktx2` …: layer 0
-    has the first four. Raises BadInput.
+    """A folder with latents of each level as an array texture of floats, `level_0.ktx2` …: four a
+    layer. Raises BadInput.
 
     Not levels of one file: those of KTX 2 round sizes down, ours up, as all texels belong to one.
     """
@@ -94,15 +95,16 @@ def write_ktx2(package: Package, target: Path) -> Notes:
 
 
 def level_latents(btf: CompressedBtf) -> list[NDArray[np.float32]]:
-    """Latents of texels of each level, (2, height, width, 4), row 0 at the top."""
+    """Latents of texels of each level, (layer, height, width, 4), padded by 0, row 0 at the top."""
     import numpy as np
 
     from pipelines.neural_btf.latent_texture import level_sizes
 
     tables = (btf.latents_of(slice(None)), *btf.mips)
     sizes = level_sizes(btf.height, btf.width)[: len(tables)]
+    padding = ((0, 0), (0, -btf.latents.shape[1] % 4))
     return [
-        np.ascontiguousarray(np.moveaxis(table.reshape(*size, 2, 4), 2, 0))
+        np.ascontiguousarray(np.moveaxis(np.pad(table, padding).reshape(*size, -1, 4), 2, 0))
         for table, size in zip(tables, sizes, strict=True)
     ]
 

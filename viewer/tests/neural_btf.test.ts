@@ -69,17 +69,25 @@ describe("the decoder", () => {
   });
 
   it.each([27, 11])("is written for WebGL with its sums unrolled, %i vectors", (vectors) => {
-    const text = shaderSource("btf_decoder.glsl", { VECTORS: vectors });
-    expect(text.match(/fourInputs\(4 \* \d+, row/g)?.length).toBe(vectors);
+    const text = shaderSource("btf_decoder.glsl", { VECTORS: vectors, LATENT_VECTORS: 2 });
+    expect(text.match(/fourInputs\(4 \* \d+, row, given/g)?.length).toBe(vectors);
+    expect(text.match(/fourInputs\(4 \* \d+, row, latents/g)?.length).toBe(2);
   });
 });
 
 describe("latents", () => {
-  it("are lines of texels, two a vector", () => {
+  it("are lines of texels, two a vector of eight", () => {
     const latents = Float32Array.from({ length: 8 * 1500 }, (_, n) => n);
-    const { width, height, data } = latentTexels(latents);
+    const { width, height, data } = latentTexels(latents, 8);
     expect([width, height]).toEqual([2048, 2]);
     expect(Array.from(data.subarray(0, latents.length))).toEqual(Array.from(latents));
+  });
+
+  it("are padded to whole texels, and begin none at a row's end", () => {
+    const latents = Float32Array.from({ length: 10 * 700 }, (_, n) => n + 1);
+    const { width, height, data } = latentTexels(latents, 10);
+    expect([width, height]).toEqual([2046, 2]);
+    expect(Array.from(data.subarray(12 * 682, 12 * 682 + 12))).toEqual([...latents.subarray(6820, 6830), 0, 0]);
   });
 
   it("are turned for a texture whose rows count from the bottom", () => {

@@ -32,7 +32,7 @@ vec3 surfaceColour() {
   float bright = SCALE * dimming(towardsLight.z);
   if (bright <= 0.0) return vec3(0.0);
   vec3 light = heldDirection(towardsLight), view = heldDirection(towardsEye);
-  vec4 latents[2];
+  vec4 latents[LATENT_VECTORS];
   latentsAt(materialPlace, footprint, stereographicPlace(view), latents);
   vec3 found = clamp(decodedColour(latents, light, view), LEAST, LARGEST);
   return bright * max(found, 0.0);

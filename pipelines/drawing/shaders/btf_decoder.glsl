@@ -1,7 +1,7 @@
-// The neural BTF's decoder (paper 1, figure 5): 8 latents and two directions to RGB over alpha by
-// three hidden layers, padded to VECTORS vectors of four neurons: 27 for the paper's 106. A row of
-// the texture is four neurons, a texel of it an input, the last one the bias; a layer's rows follow
-// those of the layer before.
+// The neural BTF's decoder (paper 1, figure 5): latents and two directions to RGB over alpha by
+// three hidden layers. Latents are padded to LATENT_VECTORS vectors of four, 2 for the paper's 8;
+// neurons to VECTORS, 27 for the paper's 106. A row of the texture is four neurons, a texel of it an
+// input, the last one the bias; a layer's rows follow those of the layer before.
 
 #include "stereographic.glsl"
 
@@ -29,16 +29,20 @@ vec4 fourNeurons(int row) {
   return sum;
 }
 
-// latents: the first and the last four. Directions are unit vectors in the texture's frame, z >= 0.
-vec3 decodedColour(vec4 latents[2], vec3 light, vec3 view) {
+// Directions are unit vectors in the texture's frame, z >= 0.
+vec3 decodedColour(vec4 latents[LATENT_VECTORS], vec3 light, vec3 view) {
   vec4 directions = vec4(stereographicPlace(light), stereographicPlace(view));
+  vec4 sum;
   for (int row = 0; row < VECTORS; row++) {
-    given[row] = max(texelFetch(weights, ivec2(4 * VECTORS, row), 0) +
-                     fourInputs(0, row, latents[0]) + fourInputs(4, row, latents[1]) +
-                     fourInputs(8, row, directions), 0.0);
+    sum = texelFetch(weights, ivec2(4 * VECTORS, row), 0);
+#pragma unroll_loop_start
+    for (int i = 0; i < LATENT_VECTORS; i++) {
+      sum += fourInputs(4 * i, row, latents[i]);
+    }
+#pragma unroll_loop_end
+    given[row] = max(sum + fourInputs(4 * LATENT_VECTORS, row, directions), 0.0);
   }
   // One loop for all layers: the unrolled sum is long to compile.
-  vec4 sum;
   for (int layer = 1; layer < 4; layer++) {
     int rows = layer < 3 ? VECTORS : 1;
     for (int row = 0; row < rows; row++) {

@@ -1,18 +1,21 @@
 // Latents of a neural BTF as a texture that repeats, as `latent_texture.py` has it: moved by
 // parallax, between four texels, between two levels. Texels of a level lie after one another, row by
-// row from the top, two texels of the sampler each; levels follow one another, the finest first.
-// TEXELS: columns and rows of the finest; LEVELS: how many; PARALLAX: 9 x 2 factors.
+// row from the top, LATENT_VECTORS texels of the sampler each; levels follow one another, the finest
+// first. TEXELS: columns and rows of the finest; LEVELS: how many; PARALLAX: 9 x 2 factors.
 
 uniform sampler2D latentVectors;
 
-void addTexel(int number, float weight, inout vec4 latents[2]) {
-  int columns = textureSize(latentVectors, 0).x, first = 2 * number;
+void addTexel(int number, float weight, inout vec4 latents[LATENT_VECTORS]) {
+  int columns = textureSize(latentVectors, 0).x, first = LATENT_VECTORS * number;
   ivec2 at = ivec2(first % columns, first / columns);
-  latents[0] += weight * texelFetch(latentVectors, at, 0);
-  latents[1] += weight * texelFetch(latentVectors, at + ivec2(1, 0), 0);
+#pragma unroll_loop_start
+  for (int i = 0; i < LATENT_VECTORS; i++) {
+    latents[i] += weight * texelFetch(latentVectors, at + ivec2(i, 0), 0);
+  }
+#pragma unroll_loop_end
 }
 
-void addLevel(int level, vec2 place, float weight, inout vec4 latents[2]) {
+void addLevel(int level, vec2 place, float weight, inout vec4 latents[LATENT_VECTORS]) {
   ivec2 size = ivec2(TEXELS);
   int first = 0;
   for (int finer = 0; finer < level; finer++) {
@@ -42,15 +45,14 @@ vec2 parallaxOf(vec2 view) {
 
 // Latents at a place of the material, where a tile is 1 and v counts from the bottom. footprint:
 // width of what is seen, in tiles; view: on the stereographic plane.
-void latentsAt(vec2 place, float footprint, vec2 view, out vec4 latents[2]) {
+void latentsAt(vec2 place, float footprint, vec2 view, out vec4 latents[LATENT_VECTORS]) {
   vec2 size = vec2(TEXELS);
   vec2 inside = fract(vec2(place.x, 1.0 - place.y) + parallaxOf(view) / size);
   float seen = footprint * max(size.x, size.y);
   float level = clamp(log2(max(seen, 1e-6)), 0.0, float(LEVELS - 1));
   int lower = min(int(level), max(LEVELS - 2, 0));
   float share = level - float(lower);
-  latents[0] = vec4(0.0);
-  latents[1] = vec4(0.0);
+  for (int i = 0; i < LATENT_VECTORS; i++) latents[i] = vec4(0.0);
   addLevel(lower, inside, 1.0 - share, latents);
   if (share > 0.0) addLevel(lower + 1, inside, share, latents);
 }

@@ -70,13 +70,15 @@ _GLASS: dict[str, Any] = {
     "COVERED_B": [1.0, 1.0, 1.0, 1.0],
     "STRENGTH": 0.5,
 }
-_LATENTS: dict[str, Any] = {"TEXELS": [48, 32], "LEVELS": 7, "PARALLAX": [0.1] * 18}
+_LATENTS: dict[str, Any] = {
+    "LATENT_VECTORS": 6, "TEXELS": [48, 32], "LEVELS": 7, "PARALLAX": [0.1] * 18,
+}  # fmt: skip
 _FUNCTION_VALUES: dict[str, Any] = {
     **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
 }  # fmt: skip
 CONSTANTS: dict[str, tuple[str, ...]] = {
-    "btf_decoder.glsl": ("VECTORS",),
-    "btf_latents.glsl": ("TEXELS", "LEVELS", "PARALLAX"),
+    "btf_decoder.glsl": ("VECTORS", "LATENT_VECTORS"),
+    "btf_latents.glsl": ("LATENT_VECTORS", "TEXELS", "LEVELS", "PARALLAX"),
     "lit_lobes.glsl": ("LEAST_VIEW",),
     "ssdf_lookup.glsl": ("SIDE",),
     "lit_distances.glsl": ("LEAST_VIEW", "SIDE", "LIGHTS"),

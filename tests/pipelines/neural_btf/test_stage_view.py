@@ -49,36 +49,38 @@ MOST_DRAWN = 2e-5
 """Places are interpolated in float32; from texel to texel these latents differ by units."""
 
 
-def bright_decoder(hidden: int) -> dict[str, NDArray[np.float32]]:
+def bright_decoder(hidden: int, latents: int = 8) -> dict[str, NDArray[np.float32]]:
     """Random weights, brightened so that most of what they say is positive."""
-    arrays = {name: values.copy() for name, values in decoder_arrays(Decoder(hidden)).items()}
+    arrays = {
+        name: values.copy() for name, values in decoder_arrays(Decoder(hidden, latents)).items()
+    }
     arrays["weight_4"] = arrays["weight_4"] * np.float32(6.0)
     arrays["bias_4"] = arrays["bias_4"] + np.float32(0.4)
     return arrays
 
 
-def btf(shared: bool, *, seed: int = 0) -> CompressedBtf:
+def btf(shared: bool, *, seed: int = 0, channels: int = 8) -> CompressedBtf:
     """All that a compressed BTF can have, at random: 5 x 6 texels, coarser levels, parallax."""
     import torch
 
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    latents = rng.normal(size=(7 if shared else 30, 8)).astype(np.float32)
+    latents = rng.normal(size=(7 if shared else 30, channels)).astype(np.float32)
     return CompressedBtf(
-        bright_decoder(HIDDEN),
+        bright_decoder(HIDDEN, channels),
         latents,
         rng.integers(7, size=30).astype(np.int32) if shared else None,
         1.7,
         height=5,
         width=6,
         mips=tuple(
-            rng.normal(size=(rows * columns, 8)).astype(np.float32)
+            rng.normal(size=(rows * columns, channels)).astype(np.float32)
             for rows, columns in level_sizes(5, 6)[1:]
         ),
         parallax=rng.normal(0, 0.8, (9, 2)).astype(np.float32),
         least=0.3,
         largest=0.5,
-        student=bright_decoder(STUDENT_HIDDEN),
+        student=bright_decoder(STUDENT_HIDDEN, channels),
     )
 
 
@@ -94,7 +96,9 @@ def decoded_by_the_stage(
         f"  vec4 latents[2];\n  latents[0] = {first};\n  latents[1] = {last};\n"
         f"  diffuseColor = decodedColour(latents, {lit}.xyz, {seen}.xyz);\n"
     )
-    source = shader_source("btf_decoder.glsl", VECTORS=decoder_vectors(made.decoder))
+    source = shader_source(
+        "btf_decoder.glsl", VECTORS=decoder_vectors(made.decoder), LATENT_VECTORS=2
+    )
     shader = Shader(
         fragment={
             "CustomUniforms::Dec": "",
@@ -215,8 +219,9 @@ def test_the_cloth_is_as_torch_decodes_it(shared: bool, tiles: float) -> None:
         assert apart(drawn, null) > 0.01, name
 
 
-def test_a_student_draws_as_torch_decodes_it() -> None:
-    scenery = scenery_of(btf(shared=False).by_student())
+@pytest.mark.parametrize("channels", [8, 22])
+def test_a_student_draws_as_torch_decodes_it(channels: int) -> None:
+    scenery = scenery_of(btf(shared=False, channels=channels).by_student())
     showing = Showing(LIGHT, 3.0, 0.8)
     drawn = draw_cloth(scenery, showing, HOME, width=SIZE[0], height=SIZE[1])
     assert apart(drawn, decoded_cloth(scenery, showing, HOME, SIZE)) < MOST_DRAWN

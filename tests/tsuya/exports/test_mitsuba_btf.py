@@ -128,7 +128,7 @@ def test_values_are_the_decoders(bsdf: Any) -> None:
 
 
 def test_values_are_those_of_the_page_of_the_file(tmp_path: Path) -> None:
-    mi, file, rng = mitsuba(), random_file(), np.random.default_rng(2)
+    mi, file, rng = mitsuba(), random_file(channels=24), np.random.default_rng(2)
     page = PageFile(write_btf_file(file))
     np.savez(tmp_path / "data.npz", **plug_in_arrays(runtime_btf(file)))
     plugged = mi.load_dict({"type": "tsuya_btf", "filename": str(tmp_path / "data.npz")})

@@ -8,7 +8,7 @@
 ``tiles`` repeats the material so often over a unit of the shape's texture coordinates, of which u
 goes along the material's x. ``filename`` holds decoder, latents and the table for sampling:
 
-- ``latents`` (row, column, 8) are a texture that repeats, row 0 at the top, bilinear between the
+- ``latents`` (row, column, c) are a texture that repeats, row 0 at the top, bilinear between the
   middles of texels; a view looks them up ``parallax`` beside a place: a polynomial of the view's
   place on the stereographic plane, in columns and rows.
 - The decoder says the radiance under a directional light that would give a white Lambertian surface
@@ -82,7 +82,7 @@ class Btf:
         return dimmed * np.maximum(colour, 0.0)
 
     def latents_at(self, u: float, v: float, x: float, y: float) -> Any:
-        """(8,) at (u, v), from a view at (x, y) of the stereographic plane."""
+        """(c,) at (u, v), from a view at (x, y) of the stereographic plane."""
         terms = [x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3]
         across, down = np.array(terms) @ self.parallax
         column = u * self.width - 0.5 + float(across)

@@ -12,7 +12,7 @@ import type { Bounds, LiveView, State, SystemViewer } from "../live_view";
 import type { MeshData } from "../package/mesh";
 import type { Package } from "../package/package";
 import { float } from "../shaders";
-import { latentTexels, upsideDown, vectorsOf, weightTexels, type Layer } from "./neural_btf/decoder_texels";
+import { latentTexels, latentVectors, upsideDown, vectorsOf, weightTexels, type Layer } from "./neural_btf/decoder_texels";
 import { packedBtf, type PackedBtf } from "./neural_btf/packed_btf";
 import { CONTROLS, withState, type Settings } from "./neural_btf/state";
 
@@ -69,11 +69,11 @@ class HangingCloth implements LiveView {
   }
 
   figures(): Record<string, number | string> {
-    const { texels, vectors, levels } = this.btf;
+    const { texels, vectors, channels, levels } = this.btf;
     return {
       "decoded by": this.drawn.decoder,
       texels: `${texels[0]} × ${texels[1]}`,
-      "latent vectors": vectors,
+      "latent vectors": `${vectors}, of ${channels} latents`,
       "levels of latents": levels,
     };
   }
@@ -92,7 +92,7 @@ function clothOf(
   mesh: MeshData,
   btf: PackedBtf,
   layers: Layer[],
-  latentVectors: THREE.Texture,
+  latents: THREE.Texture,
   who: string,
 ): DecodedCloth {
   const weights = texture(upsideDown(weightTexels(layers)), { interpolate: false });
@@ -108,6 +108,7 @@ function clothOf(
     fragment: "btf_cloth_fragment.glsl",
     values: {
       VECTORS: vectorsOf(layers),
+      LATENT_VECTORS: latentVectors(btf.channels),
       TEXELS: btf.texels,
       LEVELS: btf.levels,
       PARALLAX: btf.parallax,
@@ -119,7 +120,7 @@ function clothOf(
       EYE: "eye",
       SCALE: "scale",
     },
-    textures: { weights, latentVectors },
+    textures: { weights, latentVectors: latents },
     uniforms: {
       light: { type: "vec3", value: new THREE.Vector3() },
       eye: { type: "vec3", value: new THREE.Vector3() },
@@ -146,7 +147,7 @@ const viewer: SystemViewer = {
   name: "neural_btf",
   async make(pkg) {
     const [btf, mesh, around] = await Promise.all([packedBtf(pkg), pkg.mesh("cloth"), roomOf(pkg)]);
-    const latents = texture(upsideDown(latentTexels(btf.latents)), { interpolate: false });
+    const latents = texture(upsideDown(latentTexels(btf.latents, btf.channels)), { interpolate: false });
     const whole = clothOf(mesh, btf, btf.decoder, latents, "the whole decoder");
     const student = btf.student && clothOf(mesh, btf, btf.student, latents, "its student");
     const inFront: Settings = { light: [0, -1, 0], tiles: pkg.parameter("tiles"), exposure: 0 };

@@ -6,7 +6,6 @@ import type { Layer } from "./decoder_texels";
 
 /** Of `storage/packages/neural_btf.py`. */
 const SCHEMA = 2;
-const LATENTS = 8;
 const DIRECTIONS = 4;
 const LAYERS = [1, 2, 3, 4];
 
@@ -16,8 +15,9 @@ export interface PackedBtf {
   texels: [number, number];
   /** Latent vectors that texels share. */
   vectors: number;
-  /** Latents of texels (texel, 8), then of the coarser levels, row by row. */
+  /** Latents of texels (texel, channels), then of the coarser levels, row by row. */
   latents: Float32Array;
+  channels: number;
   /** The finest, and the coarser ones. */
   levels: number;
   decoder: Layer[];
@@ -49,37 +49,39 @@ export async function packedBtf(pkg: Package): Promise<PackedBtf> {
   if (pkg.meta.schema !== SCHEMA) {
     throw new BadPackage(pkg.name, "schema", `${pkg.meta.schema}`, `${SCHEMA}: make the package again`);
   }
+  const channels = pkg.shape("latents")[1];
   const columns = pkg.parameter("width");
   const rows = pkg.parameter("height");
   const [vectors, owners, coarser, decoder, student, parallax] = await Promise.all([
     steppedPart(pkg, "latents", "latent_steps"),
     pkg.has("ids") ? pkg.array("ids") : undefined,
     pkg.has("mips") ? steppedPart(pkg, "mips", "mip_steps") : new Float32Array(0),
-    layersOf(pkg, ""),
-    pkg.has("student_steps") ? layersOf(pkg, "student_") : undefined,
+    layersOf(pkg, "", channels),
+    pkg.has("student_steps") ? layersOf(pkg, "student_", channels) : undefined,
     pkg.has("parallax") ? pkg.floats("parallax") : new Float32Array(18),
   ]);
   const [finest, ...coarse] = levelTexels(columns, rows);
   const wrong = (field: string, found: number, expected: string) => new BadPackage(pkg.name, field, `${found}`, expected);
-  const texels = owners?.length ?? vectors.length / LATENTS;
+  const texels = owners?.length ?? vectors.length / channels;
   if (texels !== finest) throw wrong("texels", texels, `${columns} x ${rows}`);
-  const past = owners && Array.from(owners).find((owner) => owner >= vectors.length / LATENTS);
-  if (past !== undefined) throw wrong("ids", past, `less than ${vectors.length / LATENTS}`);
+  const past = owners && Array.from(owners).find((owner) => owner >= vectors.length / channels);
+  if (past !== undefined) throw wrong("ids", past, `less than ${vectors.length / channels}`);
   const expected = coarse.reduce((sum, count) => sum + count, 0);
-  if (coarser.length && coarser.length !== LATENTS * expected) {
-    throw wrong("texels of coarser levels", coarser.length / LATENTS, `${expected}`);
+  if (coarser.length && coarser.length !== channels * expected) {
+    throw wrong("texels of coarser levels", coarser.length / channels, `${expected}`);
   }
   if (parallax.length !== 18) throw wrong("numbers of parallax", parallax.length, "9 x 2");
-  const latents = new Float32Array(LATENTS * finest + coarser.length);
+  const latents = new Float32Array(channels * finest + coarser.length);
   for (let texel = 0; texel < finest; texel++) {
-    const from = LATENTS * (owners ? owners[texel] : texel);
-    latents.set(vectors.subarray(from, from + LATENTS), LATENTS * texel);
+    const from = channels * (owners ? owners[texel] : texel);
+    latents.set(vectors.subarray(from, from + channels), channels * texel);
   }
-  latents.set(coarser, LATENTS * finest);
+  latents.set(coarser, channels * finest);
   return {
     texels: [columns, rows],
-    vectors: vectors.length / LATENTS,
+    vectors: vectors.length / channels,
     latents,
+    channels,
     levels: coarser.length ? 1 + coarse.length : 1,
     decoder,
     student,
@@ -94,7 +96,7 @@ async function steppedPart(pkg: Package, name: string, steps: string): Promise<F
   return stepped(await pkg.array(name), await pkg.floats(steps));
 }
 
-async function layersOf(pkg: Package, prefix: string): Promise<Layer[]> {
+async function layersOf(pkg: Package, prefix: string, channels: number): Promise<Layer[]> {
   const steps = await pkg.floats(`${prefix}steps`);
   const layers = await Promise.all(
     LAYERS.map(async (n) => {
@@ -104,7 +106,7 @@ async function layersOf(pkg: Package, prefix: string): Promise<Layer[]> {
     }),
   );
   const hidden = layers[0].bias.length;
-  const sizes = [LATENTS + DIRECTIONS, hidden, hidden, hidden, 3];
+  const sizes = [channels + DIRECTIONS, hidden, hidden, hidden, 3];
   layers.forEach(({ weight, bias }, n) => {
     if (bias.length !== sizes[n + 1] || weight.length !== sizes[n] * sizes[n + 1]) {
       const expected = `${sizes[n + 1]} of ${sizes[n]} inputs`;
