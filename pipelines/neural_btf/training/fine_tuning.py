@@ -41,7 +41,7 @@ from pipelines.neural_btf.training.trainer import KEEP_SECONDS, TrainedNetwork
 _FIRST_STEPS = {"weight": 0.08, "bias": 0.02, "latents": 0.2, "mips": 0.3}
 """Steps of quantisation at first, in standard deviations."""
 _STEP_RATE = 0.01
-_PRICE_RATE = 0.02
+_PRICE_RATE = 0.08
 _FIRST_PRICE = 3e-10
 _STUDENT_RATE = 3.0
 """Of the plan's rate: the student begins at random."""
@@ -49,7 +49,9 @@ _STUDENT_WEIGHT = 0.5
 _MIP_TEXELS = 32
 _MIP_WEIGHT = 4.0
 """Errors of means are smaller than those of texels, and should stay so."""
-_ASK_EVERY = 50
+_PRICE_EVERY = 4
+"""Bits take as long to count as the error, and change slowly."""
+_ASK_EVERY = 48
 """Steps between questions for the file's true bytes."""
 
 
@@ -170,14 +172,16 @@ class FineTuning:
             if self._sizes:
                 of_mips, student_of_mips = self._mip_errors(random)
                 loss = loss + _MIP_WEIGHT * (of_mips + _STUDENT_WEIGHT * student_of_mips)
-            bits = self._bits()
-            loss = loss + self._price * bits
+            if self.steps_done % _PRICE_EVERY == 0:
+                bits = self._bits()
+                loss = loss + _PRICE_EVERY * self._price * bits
             for optimiser in self._optimisers:
                 optimiser.zero_grad(set_to_none=True)
             loss.backward()
         for optimiser in self._optimisers:
             optimiser.step()
-        self._change_price(float(bits.detach()))
+        if self.steps_done % _PRICE_EVERY == 0:
+            self._change_price(float(bits.detach()))
         self.steps_done += 1
         self._note(float(error.detach()))
 
