@@ -51,7 +51,7 @@ class FileSettings(Settings):
         "quantised", description="quantised: trained on, knowing it; float32: the paper's, as it is"
     )
     latents: int = Field(
-        24, ge=8, le=32, multiple_of=4, description="Quantised: latents a texel; 8 in the network"
+        8, ge=8, le=32, multiple_of=4, description="Quantised: latents a texel; 8 in the network"
     )
     share: float = Field(
         0.155,
@@ -64,7 +64,7 @@ class FileSettings(Settings):
     file_seed: int = Field(0, ge=0, description="Quantised: seed of its batches")
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"file_steps": 100, "share": 0.25, "latents": 12},
+        "test": {"file_steps": 100, "share": 0.25},
         "paper": {"file_steps": 12_000},
     }
 

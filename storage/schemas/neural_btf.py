@@ -153,7 +153,6 @@ COMPRESSED_BTF = Schema(
 )  # fmt: skip
 
 
-
 def _quality() -> dict[str, Variable]:
     """Figures of restored photographs, each beside that of restorations that know nothing.
 

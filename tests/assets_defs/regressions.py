@@ -106,7 +106,9 @@ def assert_check_finds(
     monkeypatch.undo()
     assert not done.success
     made = set(store.versions(slot)) - versions
-    assert len(made) == 1, [event.message for event in done.all_events if event.is_failure]
+    assert len(made) == 1, [
+        event.step_failure_data.error for event in done.all_events if event.is_step_failure
+    ]
     (rejected,) = made
     verdict = store.verdicts(slot, rejected)[regression.check]
     assert not verdict["passed"]

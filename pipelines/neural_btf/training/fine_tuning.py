@@ -12,7 +12,7 @@ import io
 import math
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -23,7 +23,7 @@ from torch.nn.utils import parametrize
 from pipelines.neural_btf.decoder_arrays import STUDENT_HIDDEN
 from pipelines.neural_btf.latent_texture import averaged, level_sizes
 from pipelines.neural_btf.mips import AveragedAbrdfs
-from pipelines.neural_btf.network import Decoder, decoder_arrays, decoder_of, device
+from pipelines.neural_btf.network import Decoder, device
 from pipelines.neural_btf.training.batches import Batches
 from pipelines.neural_btf.training.data import TrainingData
 from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
@@ -35,20 +35,24 @@ from pipelines.neural_btf.training.optimisers import (
     rate_share,
 )
 from pipelines.neural_btf.training.plan import FineTuningPlan
+from pipelines.neural_btf.training.quantised_decoder import (
+    quantised_decoder,
+    quantised_parts,
+    unrounded,
+    whole_numbers,
+    widened,
+)
 from pipelines.neural_btf.training.quantiser import Quantiser
 from pipelines.neural_btf.training.trainer import KEEP_SECONDS, TrainedNetwork
 
-_FIRST_STEPS = {"weight": 0.08, "bias": 0.02, "latents": 0.2, "mips": 0.3}
+_FIRST_STEPS = {"latents": 0.2, "mips": 0.3}
 """Steps of quantisation at first, in standard deviations."""
 _STEP_RATE = 0.01
 _PRICE_RATE = 0.08
 _FIRST_PRICE = 3e-10
 _STUDENT_RATE = 3.0
 """Of the plan's rate: the student begins at random."""
-_STUDENT_WEIGHT = 0.5
 _MIP_TEXELS = 32
-_MIP_WEIGHT = 4.0
-"""Errors of means are smaller than those of texels, and should stay so."""
 _PRICE_EVERY = 4
 """Bits take as long to count as the error, and change slowly."""
 _ASK_EVERY = 48
@@ -131,7 +135,7 @@ class FineTuning:
         self._directions = torch.from_numpy(data.directions).to(self._device)
         self._sizes = level_sizes(*data.size)[1:]
         self._has_parallax = trained.parallax is not None
-        self.decoder = _quantised_decoder(_widened(trained.decoder, more.shape[1]))
+        self.decoder = quantised_decoder(widened(trained.decoder, more.shape[1]))
         self.decoder.to(self._device).train()
         parallax = np.zeros((9, 2), np.float32) if trained.parallax is None else trained.parallax
         self.parallax = self._parameter(parallax)
@@ -140,9 +144,9 @@ class FineTuning:
         self.mips = self._parameter(_coarse_latents(latents, data))
         self.of_latents = self._quantiser(self.latents, "latents")
         self.of_mips = self._quantiser(self.mips, "mips")
-        self.student = _quantised_decoder(Decoder(STUDENT_HIDDEN, latents.shape[1]))
+        self.student = quantised_decoder(Decoder(STUDENT_HIDDEN, latents.shape[1]))
         self.student.to(self._device).train()
-        weights, small = _originals(self.decoder), _originals(self.student)
+        weights, small = unrounded(self.decoder), unrounded(self.student)
         self._optimisers = [
             *decoder_optimisers(weights, [self.latents, self.mips], plan.rate),
             *decoder_optimisers(small, [], _STUDENT_RATE * plan.rate),
@@ -168,10 +172,9 @@ class FineTuning:
         random = np.random.default_rng((plan.seed, 4, self.steps_done))
         with parametrize.cached():
             error, of_student = self._errors(random)
-            loss = error + _STUDENT_WEIGHT * of_student
+            loss = error + of_student
             if self._sizes:
-                of_mips, student_of_mips = self._mip_errors(random)
-                loss = loss + _MIP_WEIGHT * (of_mips + _STUDENT_WEIGHT * student_of_mips)
+                loss = loss + sum(self._mip_errors(random))
             if self.steps_done % _PRICE_EVERY == 0:
                 bits = self._bits()
                 loss = loss + _PRICE_EVERY * self._price * bits
@@ -239,18 +242,19 @@ class FineTuning:
         wanted = torch.from_numpy(np.ascontiguousarray(values)).to(self._device).float()
         wanted = wanted / self._data.scale.alpha
 
-        def error(decoder: Decoder) -> Tensor:
+        def error(decoder: Decoder, given: Tensor) -> Tensor:
             with torch.autocast(self._device.type, torch.bfloat16):
-                colours = decoder.grid_by_view(latents, directions)
+                colours = decoder.grid_by_view(given, directions)
             return ((colours.float() - wanted) ** 2).mean()
 
-        return error(self.decoder), error(self.student)
+        of_student = error(self.student, latents.detach())  # latents are the whole decoder's
+        return error(self.decoder, latents), of_student
 
     def _bits(self) -> Tensor:
         """What decoders and latents take in the file."""
         total = torch.zeros((), device=self._device)
         for decoder in (self.decoder, self.student):
-            for quantiser, original in _quantised_parts(decoder).values():
+            for quantiser, original in quantised_parts(decoder).values():
                 total = total + quantiser.bits(original)
         finest, coarse = self._whole_levels()
         if not self._data.is_textured:
@@ -285,13 +289,13 @@ class FineTuning:
         """What has been learnt so far, in whole numbers."""
         symbols = self.of_mips.symbols(self.mips)
         return QuantisedNetwork(
-            _symbols(self.decoder),
+            whole_numbers(self.decoder),
             self.of_latents.symbols(self.latents),
             self.of_latents.steps(),
             tuple(np.split(symbols, self._level_ends()[:-1])) if self._sizes else (),
             self.of_mips.steps(),
             self.parallax.detach().cpu().numpy().copy() if self._has_parallax else None,
-            _symbols(self.student),
+            whole_numbers(self.student),
             np.array([step for step, _ in self._curve], np.int64),
             np.array([value for _, value in self._curve], np.float64),
         )
@@ -349,50 +353,9 @@ class FineTuning:
         return Quantiser(values, _FIRST_STEPS[kind], by_channel=True).to(self._device)
 
     def _log_steps(self) -> list[nn.Parameter]:
-        both = (_quantised_parts(part).values() for part in (self.decoder, self.student))
+        both = (quantised_parts(part).values() for part in (self.decoder, self.student))
         parts = [quantiser for decoder in both for quantiser, _ in decoder]
         return [part.log_step for part in (*parts, self.of_latents, self.of_mips)]
-
-
-def _widened(decoder: Decoder, more: int) -> Decoder:
-    """A copy that takes so many more latents, and does not heed them yet."""
-    arrays = decoder_arrays(decoder)
-    of_latents, of_directions = np.split(arrays["weight_1"], [decoder.latents], axis=1)
-    nothing = np.zeros((len(of_latents), more), np.float32)
-    wider = np.concatenate([of_latents, nothing, of_directions], axis=1)
-    return decoder_of({**arrays, "weight_1": wider})
-
-
-def _quantised_decoder(decoder: Decoder) -> Decoder:
-    """The decoder with weights and biases that are rounded whenever they are used."""
-    for layer in decoder.layers:
-        for name in ("weight", "bias"):
-            first = Quantiser(getattr(layer, name), _FIRST_STEPS[name], by_channel=False)
-            parametrize.register_parametrization(layer, name, first)
-    return decoder
-
-
-def _quantised_parts(decoder: Decoder) -> dict[str, tuple[Quantiser, Tensor]]:
-    """Quantiser and unrounded values of ``weight_1``, ``bias_1`` …"""
-    parts = {}
-    for number, layer in enumerate(decoder.layers, start=1):
-        for name in ("weight", "bias"):
-            entry: Any = layer.get_submodule(f"parametrizations.{name}")
-            parts[f"{name}_{number}"] = (entry[0], entry.original)
-    return parts
-
-
-def _originals(decoder: Decoder) -> dict[str, Tensor]:
-    """Unrounded values of ``weight_1``, ``bias_1`` …"""
-    return {name: original for name, (_, original) in _quantised_parts(decoder).items()}
-
-
-def _symbols(decoder: Decoder) -> dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]:
-    """Whole numbers and step () of ``weight_1``, ``bias_1`` …"""
-    return {
-        name: (quantiser.symbols(original), quantiser.steps().reshape(()))
-        for name, (quantiser, original) in _quantised_parts(decoder).items()
-    }
 
 
 def _coarse_latents(latents: NDArray[np.float32], data: TrainingData) -> NDArray[np.float32]:
