@@ -42,7 +42,7 @@ RIVAL_STEPS = {"default": 3000, "paper": 16_000}
 """Steps of the rival that is trained: as many as ours has."""
 _NEWEST = "rival_rmse"
 """A key that an older benchmark's files of "none" do not have: they are written again."""
-PICTURES = {"width": 480, "frames": 6}
+PICTURES = {"width": 320, "frames": 2, "samples": 8}
 """Smaller pictures than the preset's: they are no figures."""
 
 
@@ -79,11 +79,14 @@ def _default_scale() -> dict[str, Any]:
         figures["clusters_small"] = clusters
         matrix = store.open(BTF.slot("abrdf_matrix", {"material": SMALL_MATERIAL})).load()
         groups = store.open(BTF.slot("abrdf_clusters", keys[0])).load()
-        stored = compressed_btf_of(store.open(BTF.slot("compressed_btf", keys[0])))
+        file = store.open(BTF.slot("compressed_btf", keys[0])).load()
+        stored = compressed_btf_of(file)
     pairs = pairs_of(matrix)
     abrdfs = matrix["abrdfs"].values
     with timed("against its rivals"):
-        found = against_rivals(stored, abrdfs, pairs, steps=RIVAL_STEPS["default"])
+        found = against_rivals(
+            stored, file.sizes["byte"], abrdfs, pairs, steps=RIVAL_STEPS["default"]
+        )
     found |= rmse_in_context(figures["rmse_none_small"], stored.alpha, abrdfs)
     figures |= {f"{name}_small": value for name, value in found.items()}
     data = stored_training_data(training_plan(NetworkSettings()), matrix, groups)
@@ -150,7 +153,9 @@ def _column(launcher: Launcher, material: str, column: str) -> dict[str, Any]:
     if column == NONE:
         pairs = pairs_of(matrix)
         stored = compressed_btf_of(dataset)
-        figures |= against_rivals(stored, abrdfs, pairs, steps=RIVAL_STEPS["paper"])
+        figures |= against_rivals(
+            stored, dataset.sizes["byte"], abrdfs, pairs, steps=RIVAL_STEPS["paper"]
+        )
     settings = {
         plan.name: store.record(BTF.slot(plan.name, {d: keys[d] for d in plan.by}))["settings"]
         for plan in BTF.plans.values()

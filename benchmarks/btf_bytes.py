@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from assets_defs.neural_btf.datasets import compressed_btf_dataset, compressed_btf_of
+from assets_defs.neural_btf.datasets import compressed_btf_dataset
 from assets_defs.neural_btf.declaration import BTF, NONE
-from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
 from pipelines.neural_btf.network import Decoder, decoder_arrays
+from storage.btf_file import BtfFile, section_bytes
 from storage.schemas import find_schema
 from storage.versions import Slot, VersionedStore
 
 COLUMNS = (NONE, "500", "1000", "2000")
 IMAGES = 6561
 SIDE = 100
-_PAYLOAD = ("weight", "bias", "latents", "ids")
+_PAYLOAD = ("decoder", "latents", "ids")
 
 
 def table_of_bytes() -> dict[str, Any]:
@@ -34,28 +34,20 @@ def table_of_bytes() -> dict[str, Any]:
             record = {"settings": {}, "recipe": "", "checks": []}
             store.write(slot, find_schema(BTF.name, "compressed_btf").conform(dataset), record)
             stored = store.open(slot).load()
-            figures[f"bytes_{column}"] = compressed_btf_of(stored).payload_bytes
-            sides[column] = _bytes_beside_payload(store.folder(slot))
+            sections = section_bytes(stored["file"].values.tobytes())
+            payload = sum(sections[name] for name in _PAYLOAD)
+            figures[f"bytes_{column}"] = payload
+            sides[column] = stored.sizes["byte"] - payload
     figures["bytes_side"] = max(sides.values())
     figures["bytes_raw_float32"] = IMAGES * texels * 3 * 4
     figures["bytes_raw_8bit"] = IMAGES * texels * 3
     return figures
 
 
-def _untrained(clusters: int) -> CompressedBtf:
+def _untrained(clusters: int) -> BtfFile:
+    """The paper's form."""
     random = np.random.default_rng(clusters)
     latents = random.standard_normal((clusters, 8), dtype=np.float32)
     ids = random.integers(0, clusters, SIDE * SIDE, dtype=np.int32)
-    return compressed_btf(decoder_arrays(Decoder()), latents, ids, 1.0, (SIDE, SIDE))
-
-
-def _bytes_beside_payload(folder: Path) -> int:
-    """Bytes of a version's files that hold no payload: metadata, alpha, the size."""
-    in_chunks = sum(
-        file.stat().st_size
-        for chunk in folder.rglob("c")
-        if chunk.parent.name.startswith(_PAYLOAD)
-        for file in ([chunk] if chunk.is_file() else chunk.rglob("*"))
-        if file.is_file()
-    )
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) - in_chunks
+    shared = ids if clusters < SIDE * SIDE else None
+    return BtfFile(decoder_arrays(Decoder()), latents, SIDE, SIDE, 1.0, shared)
