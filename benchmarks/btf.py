@@ -42,7 +42,7 @@ RIVAL_STEPS = {"default": 3000, "paper": 16_000}
 """Steps of the rival that is trained: as many as ours has."""
 _NEWEST = "rival_rmse"
 """A key that an older benchmark's files of "none" do not have: they are written again."""
-PICTURES = {"width": 320, "frames": 2, "samples": 8}
+PICTURES = {"width": 320, "frames": 2, "cloth_samples": 8}
 """Smaller pictures than the preset's: they are no figures."""
 
 

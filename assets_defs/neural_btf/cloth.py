@@ -25,12 +25,12 @@ class ClothSettings(Settings):
 
     width: int = Field(256, ge=32, le=8192, description="Width, pixels")
     frames: int = Field(6, ge=1, le=720, description="Pictures of the orbit, and of the light")
-    samples: int = Field(24, ge=2, le=4096, multiple_of=2, description="Samples a pixel")
+    cloth_samples: int = Field(24, ge=2, le=4096, multiple_of=2, description="Samples a pixel")
     tiles: float = Field(20.0, gt=0.0, le=1000.0, description="Tiles along the cloth's 2 metres")
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"width": 64, "frames": 2, "samples": 4},
-        "paper": {"width": 640, "frames": 16, "samples": 128},
+        "test": {"width": 64, "frames": 2, "cloth_samples": 4},
+        "paper": {"width": 640, "frames": 16, "cloth_samples": 128},
     }
 
 
@@ -73,7 +73,7 @@ def cloth_frames(
         compressed_btf_of(compressed_btf),
         btf_images["images"].values,
         pairs_of(btf_images),
-        Shots(settings.width, settings.samples, settings.frames, settings.tiles),
+        Shots(settings.width, settings.cloth_samples, settings.frames, settings.tiles),
         progress,
     )
     return cloth_frames_dataset(frames), {"frames": settings.frames}
