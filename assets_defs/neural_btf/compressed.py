@@ -29,7 +29,7 @@ from pipelines.neural_btf.clusters import warm_start
 from pipelines.neural_btf.decoder_arrays import LATENTS, direction_inputs
 from pipelines.neural_btf.representatives import cluster_means, cluster_members
 from pipelines.neural_btf.training.plan import FineTuningPlan, TrainingPlan
-from storage.btf_file import Quantised, read_texel, write_btf_file
+from storage.btf_file import Quantised, write_btf_file
 from storage.schemas import neural_btf as schemas
 from storage.stored_version import StoredVersion
 from storage.work_state import WorkState
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from pipelines.neural_btf.training.fine_tuning import QuantisedNetwork
 
 _MIP_BYTES = 2 << 30
-_TEXELS = 32
-"""Read one by one."""
 
 
 class FileSettings(Settings):
@@ -77,17 +75,6 @@ def _size_ratio(version: StoredVersion) -> float:
     clusters = len(btf.latents.symbols if isinstance(btf.latents, Quantised) else btf.latents)
     table = figures.table_bytes(clusters, btf.height * btf.width)
     return version.dataset.sizes["byte"] / table
-
-
-def _random_access_mismatches(version: StoredVersion) -> float:
-    import numpy as np
-
-    btf, data = btf_file_of(version.dataset), version.dataset["file"].values.tobytes()
-    whole = btf.latents.symbols if isinstance(btf.latents, Quantised) else btf.latents
-    owners = np.arange(btf.height * btf.width) if btf.ids is None else btf.ids
-    texels = np.unique(np.linspace(0, len(owners) - 1, _TEXELS).astype(int))
-    found = [read_texel(data, 0, *divmod(int(texel), btf.width)) for texel in texels]
-    return float(np.any(np.array(found) != whole[owners[texels]], axis=1).sum())
 
 
 def _rmse_over_network(version: StoredVersion) -> float:
@@ -189,12 +176,6 @@ def quantised_network(
             _rmse_over_network,
             at_most=1.1,
             change=0.02,
-        ),
-        Check(
-            "random_access_mismatches",
-            "Texels whose latents, read by themselves, are not those of the whole file.",
-            _random_access_mismatches,
-            at_most=0.0,
         ),
     ),
 )
