@@ -131,7 +131,7 @@ def _made_of(version: StoredVersion, partition: str) -> tuple[Any, str]:
             "grazing_detail",
             "Share of gradients kept and right at views of 60 degrees and more; flat colours: 0.",
             _stored("grazing_detail"),
-            at_least=0.2,
+            at_least=0.1,
             change=0.05,
         ),
     ),
