@@ -19,6 +19,7 @@ SHORT = {
     "texels": 100,
     "frames": 1,
     "samples": 2,
+    "cloth_samples": 2,
 }
 """Training and pictures are cut short: sizes are looked at here, not the paper's errors."""
 PAYLOAD = {"none": 417_532, "500": 153_532}
