@@ -16,6 +16,7 @@ from typing import Any
 
 NAMES = (
     "btf",
+    "btf_paper_training",
     "captures",
     "contents",
     "faults",

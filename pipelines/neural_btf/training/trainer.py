@@ -110,8 +110,8 @@ class Trainer:
         """Whether all stages are done."""
         return self._stage == len(self.stages)
 
-    def step(self) -> None:
-        """One step of gradient descent."""
+    def step(self) -> Tensor:
+        """One step of gradient descent; returns the loss before it."""
         name, steps = self.stages[self._stage]
         self._set_rate(name, self._step_in_stage / steps)
         seed = (self._plan.seed, _STAGE_NUMBER[name], self._step_in_stage)
@@ -127,6 +127,7 @@ class Trainer:
             self._note(loss.detach())
         if self._step_in_stage == steps:
             self._end_stage(name)
+        return loss.detach()
 
     def result(self) -> TrainedNetwork:
         """What has been learnt so far."""
