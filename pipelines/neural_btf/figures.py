@@ -8,17 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.light.directions import Pairs
-from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.decoder_arrays import (
-    DECODER_PARAMETERS,
-    LATENTS,
-    DecoderArrays,
-    decode_in_numpy,
-)
-
-_CHECKED_TEXELS = 64
-_CHECKED_PAIRS_STEP = 97
-
+from pipelines.neural_btf.decoder_arrays import DECODER_PARAMETERS, LATENTS
 
 # ---- photographs -----------------------------------------------------------------------------
 
@@ -110,29 +100,6 @@ def table_bytes(clusters: int, texels: int) -> int:
     """
     index = 0 if clusters == texels else 4 * texels
     return 4 * (DECODER_PARAMETERS + LATENTS * clusters) + index
-
-
-def bytes_over_table(compressed: CompressedBtf) -> int:
-    """Difference of a compressed BTF's bytes from those of table 1, either way."""
-    return abs(compressed.payload_bytes - table_bytes(len(compressed.latents), compressed.texels))
-
-
-def decoding_error(
-    compressed: CompressedBtf,
-    decoder: DecoderArrays,
-    latents: NDArray[np.floating],
-    directions: NDArray[np.float32],
-) -> float:
-    """Largest step between decoded values and a trained network's, over alpha.
-
-    Of 64 texels in every 97th pair. ``decoder`` are the trained network's arrays, ``latents``
-    (texel, 8) its latents of every texel, ``directions`` (pair, 4) the decoder's inputs.
-    """
-    inputs = directions[::_CHECKED_PAIRS_STEP]
-    texels = np.unique(np.linspace(0, compressed.texels - 1, _CHECKED_TEXELS).astype(int))
-    expected = decode_in_numpy(decoder, latents[texels], inputs)
-    found = np.concatenate([compressed.abrdfs(texel, texel + 1, inputs) for texel in texels])
-    return float(np.abs(found - expected).max())
 
 
 # ---- pictures --------------------------------------------------------------------------------

@@ -142,5 +142,5 @@ def test_places_are_metres_on_the_cloth() -> None:
     for axis in (0, 1):
         world, flat = (np.linalg.norm(np.diff(x, axis=axis), axis=-1) for x in (grid, places))
         assert (world / flat).min() > 0.88  # in the sharpest folds
-        assert (world / flat).max() < 1.15
+        assert (world / flat).max() < 1.2
         assert (world / flat).std() < 0.02
