@@ -37,7 +37,7 @@ from pipelines.neural_btf.training.trainer import TrainedNetwork, Trainer
 
 RESULTS = Path(__file__).parent / "results" / "btf_paper_training.json"
 MATERIAL = "knit"
-LONG_SECONDS, SHORT_SECONDS = 7200.0, 300.0
+LONG_SECONDS, SHORT_SECONDS = 7200.0, 150.0
 SEEDS = (0, 1, 2)
 _KEEP_SECONDS = 60.0
 _CURVE_STEPS = 100

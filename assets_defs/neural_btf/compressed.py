@@ -62,7 +62,7 @@ class FileSettings(Settings):
     file_seed: int = Field(0, ge=0, description="Quantised: seed of its batches")
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"file_steps": 100, "share": 0.25},
+        "test": {"file_steps": 200, "share": 0.25},
         "paper": {"file_steps": 12_000},
     }
 

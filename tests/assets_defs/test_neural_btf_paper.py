@@ -14,8 +14,8 @@ from assets_defs.neural_btf.graph import BTF
 MATERIAL = {"material": "silk"}
 SHORT = {
     "steps": 300,
-    "file_steps": 100,
-    "encoder_steps": 20,
+    "file_steps": 200,
+    "encoder_steps": 40,
     "texels": 100,
     "frames": 1,
     "samples": 2,
