@@ -8,7 +8,6 @@ are what is trained. Runs that were stopped go on; every run's figures are kept 
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import tempfile
 import time
@@ -19,19 +18,13 @@ import numpy as np
 import xarray as xr
 
 from assets_defs.launcher import Launcher, Request
-from assets_defs.neural_btf.datasets import abrdf_reader, pairs_of, photograph_blocks
+from assets_defs.neural_btf.datasets import photograph_blocks
 from assets_defs.neural_btf.graph import BTF
-from assets_defs.neural_btf.network import POOL_BYTES
 from assets_defs.workspace import Workspace
 from benchmarks.btf_launching import opened_launcher, timed
-from pipelines.neural_btf.abrdf_pool import AbrdfPool
+from benchmarks.btf_training import data_of_matrix, trained_rmse
 from pipelines.neural_btf.clusters import AbrdfClusters, cluster_abrdfs, single_texel_clusters
-from pipelines.neural_btf.compressed import compressed_btf
-from pipelines.neural_btf.decoder_arrays import direction_inputs
-from pipelines.neural_btf.network import decoder_arrays
 from pipelines.neural_btf.representatives import Representative
-from pipelines.neural_btf.restoration import restoration_errors
-from pipelines.neural_btf.training.data import AbrdfScale, training_data
 from pipelines.neural_btf.training.plan import Targets, TrainingPlan
 from pipelines.neural_btf.training.trainer import TrainedNetwork, Trainer
 
@@ -133,19 +126,11 @@ def _made(launcher: Launcher, one: Run, root: Path, size: dict[str, int]) -> dic
 
 def _trained(one: Run, images: xr.Dataset, matrix: xr.Dataset, state: Path) -> dict[str, Any]:
     plan = TrainingPlan("paper", _ENDLESS, 0.08, 5, targets=one.targets, seed=one.seed)
-    groups, pairs = _clusters(one, images, matrix), pairs_of(matrix)
-    texels, count, _ = matrix["abrdfs"].shape
-    reader, extent = abrdf_reader(matrix), (int(matrix["height"]), int(matrix["width"]))
-    pool = AbrdfPool(reader, texels, count, block=texels, budget=POOL_BYTES, seed=one.seed)
-    scale = AbrdfScale(matrix["mean"].values, matrix["deviation"].values, float(matrix["alpha"]))
-    data = training_data(pool, groups, scale, direction_inputs(pairs), extent, plan)
+    groups = _clusters(one, images, matrix)
+    data, read = data_of_matrix(matrix, groups, plan)
     trained, spent, steps, curve = _against_the_clock(Trainer(data, plan), one.seconds, state)
-    stored = compressed_btf(
-        decoder_arrays(trained.decoder), trained.latents, groups.ids, scale.alpha, extent
-    )
-    stored = dataclasses.replace(stored, least=0.0, largest=1.0)
-    errors = restoration_errors(stored, lambda a, b: pool.part(0)[1][a:b], pairs, block=400)
-    return {"rmse": errors.rmse, "cpu_seconds": round(spent), "steps": steps, "curve": curve}
+    rmse = trained_rmse(trained, matrix, groups, read)
+    return {"rmse": rmse, "cpu_seconds": round(spent), "steps": steps, "curve": curve}
 
 
 def _clusters(one: Run, images: xr.Dataset, matrix: xr.Dataset) -> AbrdfClusters:

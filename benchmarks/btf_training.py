@@ -7,18 +7,58 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from assets_defs.neural_btf.network import NetworkSettings, training_plan
+from assets_defs.neural_btf.datasets import abrdf_reader, pairs_of
+from assets_defs.neural_btf.network import POOL_BYTES, NetworkSettings, training_plan
 from benchmarks.btf_errors import btf_rmse
 from pipelines.light.directions import Pairs
-from pipelines.neural_btf.compressed import CompressedBtf
+from pipelines.neural_btf.abrdf_pool import AbrdfPool, AbrdfReader
+from pipelines.neural_btf.clusters import AbrdfClusters
+from pipelines.neural_btf.compressed import CompressedBtf, compressed_btf
+from pipelines.neural_btf.decoder_arrays import direction_inputs
 from pipelines.neural_btf.network import decoder_arrays
-from pipelines.neural_btf.training.data import TrainingData
+from pipelines.neural_btf.restoration import restoration_errors
+from pipelines.neural_btf.training.data import AbrdfScale, TrainingData, training_data
 from pipelines.neural_btf.training.plan import TrainingPlan
 from pipelines.neural_btf.training.trainer import TrainedNetwork, train
 
 PAPER_SECONDS = 300.0
+
+
+def data_of_matrix(
+    matrix: xr.Dataset, groups: AbrdfClusters, plan: TrainingPlan
+) -> tuple[TrainingData, AbrdfReader]:
+    """What a plan is trained on, of a stored `abrdf_matrix`, and a reader of its ABRDFs."""
+    texels, count, _ = matrix["abrdfs"].shape
+    pool = AbrdfPool(
+        abrdf_reader(matrix), texels, count, block=texels, budget=POOL_BYTES, seed=plan.seed
+    )
+    scale = AbrdfScale(matrix["mean"].values, matrix["deviation"].values, float(matrix["alpha"]))
+    directions = direction_inputs(pairs_of(matrix))
+    data = training_data(pool, groups, scale, directions, _size_of(matrix), plan)
+    return data, lambda first, last: pool.part(0)[1][first:last]
+
+
+def trained_rmse(
+    trained: TrainedNetwork, matrix: xr.Dataset, groups: AbrdfClusters, read: AbrdfReader
+) -> float:
+    """RMSE over alpha of all photographs, in the paper's float32 form."""
+    stored = compressed_btf(
+        decoder_arrays(trained.decoder),
+        trained.latents,
+        groups.ids,
+        float(matrix["alpha"]),
+        _size_of(matrix),
+        trained.parallax,
+    )
+    held = replace(stored, least=0.0, largest=1.0)
+    return restoration_errors(held, read, pairs_of(matrix), block=400).rmse
+
+
+def _size_of(matrix: xr.Dataset) -> tuple[int, int]:
+    return int(matrix["height"]), int(matrix["width"])
 
 
 def _with(stored: CompressedBtf, trained: TrainedNetwork) -> CompressedBtf:

@@ -63,7 +63,7 @@ class FileSettings(Settings):
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"file_steps": 200, "share": 0.25},
-        "paper": {"file_steps": 12_000},
+        "paper": {"latents": 16, "file_steps": 8000, "file_rate": 0.01},
     }
 
 
