@@ -239,6 +239,29 @@ CLOTH_FRAMES = Schema(
     },
 )  # fmt: skip
 
+RATE_DISTORTION = Schema(
+    _SYSTEM,
+    "rate_distortion",
+    1,
+    "What bytes buy: RMSE of files of many sizes, made of one network; `rate` is bytes, RMSE.",
+    {
+        "bits": Variable(("bits",), "int64", "1", "Bits of a latent, plainly rounded"),
+        "rounded": Variable(
+            ("bits", "rate"), "float64", "alpha", "Files of weights in 8 bits, latents in so many"
+        ),
+        "clusters": Variable(("clusters",), "int64", "1", "Clusters of texels that share latents"),
+        "clustered": Variable(
+            ("clusters", "rate"), "float64", "alpha", "Files of mean latents, not trained further"
+        ),
+        "gained": Variable(
+            ("clusters", "rate"), "float64", "alpha", "The same with a gain of a byte a texel"
+        ),
+        "float32": Variable(("rate",), "float64", "alpha", "The paper's form", "table 1"),
+        "file": Variable(("rate",), "float64", "alpha", "The file, trained to be rounded"),
+        "null": Variable((), "float64", "alpha", "RMSE of the mean ABRDF for every texel"),
+    },
+)
+
 BTF_PACKAGE = Schema(
     _SYSTEM,
     "btf_package",
@@ -255,5 +278,6 @@ SCHEMAS = (
     COMPRESSED_BTF,
     RESTORED_IMAGES,
     CLOTH_FRAMES,
+    RATE_DISTORTION,
     BTF_PACKAGE,
 )

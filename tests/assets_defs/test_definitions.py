@@ -81,6 +81,7 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "compressed_btf": {"abrdf_matrix", "abrdf_clusters", "neural_btf"},
         "restored_images": {"btf_images", "abrdf_matrix", "compressed_btf"},
         "cloth_frames": {"btf_images", "compressed_btf"},
+        "rate_distortion": {"abrdf_matrix", "abrdf_clusters", "neural_btf", "compressed_btf"},
         "btf_package": {"compressed_btf", "restored_images"},
     }
     assert _parents(house, SCRATCHES) == {
