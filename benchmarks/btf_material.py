@@ -40,8 +40,6 @@ from pipelines.neural_btf.material import Material, MeasuredBtf, mean_colour
 from storage.btf_file import BtfFile, write_btf_file
 from storage.work_state import WorkState
 
-SMALL_SHARE = 0.097
-"""Of the paper's bytes: 40 500."""
 _LOOKUPS = 200_000
 _STEEPEST = 1.3
 """Radians from the normal."""
@@ -55,6 +53,8 @@ class MaterialPlan:
     preset: str
     given: dict[str, object]
     """Settings in place of the preset's."""
+    small_share: float
+    """`FileSettings.share` of the smaller file."""
     rival_steps: int
     """Of the rival that is trained."""
     cloth: tuple[int, int]
@@ -90,7 +90,7 @@ def made(launcher: Launcher, material: str, plan: MaterialPlan, seed: int = 0) -
     slots = {n: BTF.slot(n, {d: keys[d] for d in BTF.plans[n].by}) for n in names}
     matrix, groups, network, file = (store.open(slots[name]).load() for name in names[:4])
     settings = FileSettings(
-        **{**store.record(slots["compressed_btf"])["settings"], "share": SMALL_SHARE}
+        **{**store.record(slots["compressed_btf"])["settings"], "share": plan.small_share}
     )
     work = WorkState(Path(launcher.workspace.root) / "small_files", f"{material}-{seed}")
     with timed(f"{material}: a smaller file"):

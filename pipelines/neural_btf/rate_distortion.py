@@ -139,7 +139,7 @@ def rate_distortion_picture(curves: Curves) -> NDArray[np.uint8]:
         )
     axis.plot(*curves.float32, "D", color="tab:gray", label="float32, the paper's form")
     axis.plot(*curves.file, "*", color="tab:green", markersize=14, label="the file")
-    axis.axhline(float(curves.null), color="black", linewidth=0.8, linestyle="--", label="mean ABRDF")
+    axis.axhline(float(curves.null), color="black", linewidth=0.8, linestyle="--", label="mean")
     axis.set(xlabel="bytes", ylabel="RMSE over alpha", xscale="log", yscale="log")
     axis.grid(alpha=0.3, which="both")
     axis.legend(fontsize=8)
