@@ -52,7 +52,7 @@ class FileSettings(Settings):
         8, ge=8, le=32, multiple_of=4, description="Quantised: latents a texel; 8 in the network"
     )
     share: float = Field(
-        0.155,
+        0.1565,
         gt=0.03,
         le=1.0,
         description="Quantised: bytes over those of the paper's decoder and latents",

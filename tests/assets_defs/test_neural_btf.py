@@ -16,6 +16,7 @@ from assets_defs.launcher import LaunchError, Request
 from assets_defs.neural_btf import compressed as file_assets
 from assets_defs.neural_btf import datasets
 from assets_defs.neural_btf import package as package_assets
+from assets_defs.neural_btf import rate_distortion as rate_assets
 from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.graph import BTF
 from pipelines.light import directions
@@ -261,6 +262,12 @@ def _next_latents(right: Callable[..., Any], *given: Any) -> Any:
     return values | {"latents": np.roll(values["latents"], 1, axis=0)}
 
 
+def _other_texels(right: Callable[..., Any], *given: Any) -> Any:
+    btf = right(*given)
+    order = np.random.default_rng(0).permutation(len(btf.latents))
+    return dataclasses.replace(btf, latents=btf.latents[order])
+
+
 REGRESSIONS = (
     Regression("missing_pairs", directions, "all_pairs", _double_pair, MATERIAL),
     Regression(
@@ -306,6 +313,8 @@ REGRESSIONS = (
     Regression("worst_texels", compressed.CompressedBtf, "abrdfs", _mean_colours, CLUSTERED),
     Regression("grazing_detail", compressed.CompressedBtf, "abrdfs", _next_texels, CLUSTERED),
     Regression("closeup_over_flat", rendering, "surface_radiance", _light_from_behind, WITHOUT),
+    Regression("file_over_rounding", rate_assets, "compressed_btf_of", _other_texels, WITHOUT),
+    Regression("file_over_null", rate_assets, "compressed_btf_of", _other_texels, WITHOUT),
     Regression("mismatches", package_assets, "_values", _next_latents, CLUSTERED),
 )
 

@@ -50,8 +50,8 @@ _FIRST_STEPS = {"latents": 0.2, "mips": 0.3}
 _STEP_RATE = 0.01
 _PRICE_RATE = 0.08
 _FIRST_PRICE = 3e-10
-_STUDENT_RATE = 3.0
-"""Of the plan's rate: the student begins at random."""
+_STUDENT_RATE = 0.01
+"""The student begins at random, whatever the plan's rate: 0.03 ends a twentieth worse."""
 _MIP_TEXELS = 32
 _PRICE_EVERY = 4
 """Bits take as long to count as the error, and change slowly."""
@@ -149,7 +149,7 @@ class FineTuning:
         weights, small = unrounded(self.decoder), unrounded(self.student)
         self._optimisers = [
             *decoder_optimisers(weights, [self.latents, self.mips], plan.rate),
-            *decoder_optimisers(small, [], _STUDENT_RATE * plan.rate),
+            *decoder_optimisers(small, [], _STUDENT_RATE),
             parallax_optimiser(self.parallax, plan.rate),
             adam(self._log_steps(), _STEP_RATE),
         ]
