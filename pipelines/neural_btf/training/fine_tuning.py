@@ -8,6 +8,7 @@ while it is smaller, so that each channel and layer gets as many bits as it is w
 
 from __future__ import annotations
 
+import bisect
 import io
 import math
 import time
@@ -46,7 +47,9 @@ from pipelines.neural_btf.training.quantiser import Quantiser
 from pipelines.neural_btf.training.trainer import KEEP_SECONDS, TrainedNetwork
 
 _FIRST_STEPS = {"latents": 0.2, "mips": 0.3}
-"""Steps of quantisation at first, in standard deviations."""
+"""Steps of quantisation in standard deviations, times what makes the first file as large as
+wanted."""
+_COARSENINGS = np.geomspace(0.5, 2.0, 7)
 _STEP_RATE = 0.01
 _PRICE_RATE = 0.08
 _FIRST_PRICE = 3e-10
@@ -159,6 +162,20 @@ class FineTuning:
         self._price, self._true_share = _FIRST_PRICE, 1.0
         self._curve: list[tuple[int, float]] = []
         self._squares, self._count = 0.0, 0
+        self._begin_at_the_size()
+
+    def _begin_at_the_size(self) -> None:
+        """Make latents as coarse as the file's size asks: few steps of training would not."""
+        quantisers = self.of_latents, self.of_mips
+        first = [quantiser.log_step.detach().clone() for quantiser in quantisers]
+
+        def is_larger(times: float) -> bool:
+            for quantiser, log_step in zip(quantisers, first, strict=True):
+                quantiser.log_step.data = log_step + math.log(times)
+            return self._file_bytes(self.result()) > self._plan.file_bytes
+
+        found = bisect.bisect_left(_COARSENINGS, True, key=lambda times: not is_larger(times))
+        is_larger(_COARSENINGS[min(found, len(_COARSENINGS) - 1)])
 
     # ---- a step ------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ from pipelines.neural_btf.training.trainer import TrainedNetwork, train
 SIZE = (8, 6)
 PAIRS = all_pairs(hemisphere_table(15), hemisphere_table(15))
 DIRECTIONS = direction_inputs(PAIRS)
-PLAN = FineTuningPlan(file_bytes=20_000, steps=250, batch_texels=16, batch_images=32)
+PLAN = FineTuningPlan(file_bytes=24_000, steps=250, batch_texels=16, batch_images=32)
 
 
 def photographs() -> NDArray[np.float16]:
@@ -104,6 +104,20 @@ def test_a_rounded_network_is_as_good_as_the_float_one(clusters: int | None) -> 
     assert after.latents.shape[1] == 12
     student = rmse(after.by_student(), wanted)
     assert student < 0.9 * rmse(forgotten, wanted)
+
+
+def latent_bytes(network: QuantisedNetwork) -> int:
+    """A thousand bytes for each mean absolute symbol: what the decoder takes is left out."""
+    levels = np.concatenate([network.latents, *network.mips])
+    return int(1000 * np.abs(levels).mean())
+
+
+def test_training_begins_at_the_wanted_size() -> None:
+    data, trained, more, coarse = fitted()
+    for wanted in (2400, 9000):
+        plan = dataclasses.replace(PLAN, file_bytes=wanted)
+        tuning = FineTuning(data, trained, more, coarse, plan, latent_bytes)
+        assert 0.6 * wanted < latent_bytes(tuning.result()) <= wanted
 
 
 def test_far_levels_show_the_mean_of_what_they_cover() -> None:
