@@ -22,6 +22,7 @@ from benchmarks.btf_training import data_of_matrix, trained_rmse
 from pipelines.neural_btf.clusters import single_texel_clusters
 from pipelines.neural_btf.training.plan import TrainingPlan
 from pipelines.neural_btf.training.trainer import train
+from storage.versions import VersionedStore
 
 RESULTS = Path(__file__).parent / "results"
 RUNS = (("knit", 0), ("corduroy", 0), ("silk", 0), ("twill", 0), ("knit", 1))
@@ -49,6 +50,7 @@ HEADLINES = (
     "student_macs_ratio",
     "student_rmse_ratio",
     "grazing_detail",
+    "grazing_energy",
     "mip_error_ratio",
     "shader_vs_numpy_rmse",
 )
@@ -94,12 +96,22 @@ def _write(launcher: Launcher, material: str, seed: int, root: Path) -> None:
         figures |= _none_gain(material, root / "four_rays")
     keys = {"material": material, "clusters": NONE}
     store = launcher.workspace.store
+    figures |= all_photographs(store, material)
     settings = {
         plan.name: store.record(BTF.slot(plan.name, {d: keys[d] for d in plan.by}))["settings"]
         for plan in BTF.plans.values()
     }
     about = {"settings": settings, "commit": commit(), "machine": machine()}
     result_path(material, seed).write_text(json.dumps(figures | about, indent=1) + "\n")
+
+
+def all_photographs(store: VersionedStore, material: str) -> dict[str, Any]:
+    """Figures of the file over all photographs, with their nulls, and ``grazing_energy``: gradient
+    energy at views of 60 degrees and more, right or not."""
+    slot = BTF.slot("restored_images", {"material": material, "clusters": NONE})
+    errors = store.open(slot)
+    found = {str(name): float(part) for name, part in errors.data_vars.items() if not part.dims}
+    return {"grazing_energy": found["grazing_energy"], "all_photographs": found}
 
 
 def _none_gain(material: str, root: Path) -> dict[str, float]:

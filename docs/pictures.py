@@ -5,6 +5,7 @@ Launches what the pictures show, at the demo's sizes: more partitions than the d
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,10 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
     STREET: {"drive": ("city",)},
 }
 """Keys by dimension of what the pictures show."""
-GIVEN: dict[System, dict[str, int]] = {STREET: {"frames": 18}}
+GIVEN: dict[System, dict[str, int]] = {
+    BTF: {"width": 480, "cloth_samples": 96},
+    STREET: {"frames": 18},
+}
 """Settings that differ from the demo's."""
 _HEIGHT = 400
 _GAP = 10
@@ -76,7 +80,8 @@ def make_pictures(store: VersionedStore) -> None:
         Image.fromarray(_shown(store, BTF, "restored_images", knit, name)).save(
             FOLDER / f"btf-{name}.png", optimize=True
         )
-    _moving("btf-wall.webp", _wall(store))
+    _moving("btf-wall.webp", _wall(store)[:, ::2, ::2])
+    _cloths(store, materials)
     _scratches(store)
     _lighting(store)
     _street(store)
@@ -210,6 +215,18 @@ def _shown(
     if name is None:
         (name,) = made
     return made[name]
+
+
+def _cloths(store: VersionedStore, materials: Sequence[str]) -> None:
+    """Each cloth from a hand's breadth, and whole below."""
+    keys = [{"material": material, "clusters": "none"} for material in materials]
+    rows = [
+        np.hstack([_shown(store, BTF, "cloth_frames", one, name) for one in keys])
+        for name in ("close-up", "draped")
+    ]
+    Image.fromarray(np.vstack(rows)).save(FOLDER / "btf-cloths.jpg", quality=90, optimize=True)
+    curve = _shown(store, BTF, "rate_distortion", keys[0], "rate-distortion")
+    Image.fromarray(curve).save(FOLDER / "btf-rate-distortion.png", optimize=True)
 
 
 def _wall(store: VersionedStore) -> NDArray[np.uint8]:
