@@ -69,9 +69,6 @@ def planned_runs(scale: str) -> list[Run]:
 
 def run(scale: str) -> dict[str, Any]:
     """RMSE of every run over all photographs, with processor seconds, and means over seeds."""
-    import torch
-
-    torch.set_num_threads(1)
     more: dict[str, Any] = {}
     if scale == "paper":
         root = Workspace.from_environment().root / "benchmarks"
