@@ -47,7 +47,7 @@ PLAN = MaterialPlan(
         "frames": 1,
         "cloth_samples": 2,
     },
-    small_share=0.15,
+    small={"share": 0.15, "latents": 8},
     rival_steps=1500,
     cloth=(160, 64),
 )

@@ -53,8 +53,8 @@ class MaterialPlan:
     preset: str
     given: dict[str, object]
     """Settings in place of the preset's."""
-    small_share: float
-    """`FileSettings.share` of the smaller file."""
+    small: dict[str, object]
+    """Settings of the smaller file in place of the file's."""
     rival_steps: int
     """Of the rival that is trained."""
     cloth: tuple[int, int]
@@ -89,9 +89,7 @@ def made(launcher: Launcher, material: str, plan: MaterialPlan, seed: int = 0) -
     names = ("abrdf_matrix", "abrdf_clusters", "neural_btf", "compressed_btf", "btf_images")
     slots = {n: BTF.slot(n, {d: keys[d] for d in BTF.plans[n].by}) for n in names}
     matrix, groups, network, file = (store.open(slots[name]).load() for name in names[:4])
-    settings = FileSettings(
-        **{**store.record(slots["compressed_btf"])["settings"], "share": plan.small_share}
-    )
+    settings = FileSettings(**store.record(slots["compressed_btf"])["settings"] | plan.small)
     work = WorkState(Path(launcher.workspace.root) / "small_files", f"{material}-{seed}")
     with timed(f"{material}: a smaller file"):
         small = quantised_network(settings, work, lambda _: None, matrix, groups, network)

@@ -30,7 +30,7 @@ RUNS = (("knit", 0), ("corduroy", 0), ("silk", 0), ("twill", 0), ("knit", 1))
 PLAN = MaterialPlan(
     preset="paper",
     given={"width": 320, "frames": 2, "cloth_samples": 8},  # pictures: they are no figures here
-    small_share=0.097,  # 40 500 bytes
+    small={"share": 0.097, "latents": 8},  # 40 500 bytes
     rival_steps=8000,
     cloth=(320, 128),
 )

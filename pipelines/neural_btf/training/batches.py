@@ -12,8 +12,9 @@ from pipelines.neural_btf.training.data import TrainingData
 
 _STEPS_A_PART = 500
 """Steps that draw from one part of the pool before the next part is read."""
-_VIEWS = 8
-"""Views of a batch that looks latents up by the view: once a texel and view, not once a pair."""
+_VIEWS = 64
+"""Views of a batch that looks latents up by the view, once a texel and view: with 8, as cheap, the
+error ends 3 to 5 % higher, for pairs of one view are too much alike."""
 
 
 class Batch(NamedTuple):
