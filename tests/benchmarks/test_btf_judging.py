@@ -1,3 +1,5 @@
+"""What judges forms and rivals of a BTF."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Committed figures of paper-size BTFs, told together."""
+
 from __future__ import annotations
 
 import json
@@ -9,7 +11,7 @@ from benchmarks import btf_paper_scale
 
 
 def _commit(folder: Path, material: str, seed: int, ratio: float) -> None:
-    figures = {name: ratio for name in btf_paper_scale.HEADLINES}
+    figures = dict.fromkeys(btf_paper_scale.HEADLINES, ratio)
     (folder / f"btf-file-{material}-{seed}.json").write_text(json.dumps(figures))
 
 

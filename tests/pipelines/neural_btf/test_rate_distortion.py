@@ -1,3 +1,5 @@
+"""What bytes buy: rounding, clusters, gains, against closed forms."""
+
 from __future__ import annotations
 
 from dataclasses import replace
