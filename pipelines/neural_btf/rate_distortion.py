@@ -71,9 +71,9 @@ def rounded(
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Whole numbers of so many bits, sign included, and steps: a column (n, channel) has its own.
 
-    >>> symbols, steps = rounded(np.array([[-2.0], [1.2], [0.6]]), 3)
-    >>> symbols.ravel().tolist(), steps.round(3).tolist()
-    ([-3, 2, 1], [0.667])
+    >>> symbols, steps = rounded(np.array([[-3.0], [1.8], [0.9]]), 3)
+    >>> symbols.ravel().tolist(), steps.tolist()
+    ([-3, 2, 1], [1.0])
     """
     largest = np.abs(values).max(axis=0)
     steps = np.where(largest > 0, largest, 1.0) / (2 ** (bits - 1) - 1)
