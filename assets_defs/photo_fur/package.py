@@ -77,7 +77,7 @@ def _expected_photograph(version: StoredVersion, layers: int) -> NDArray[np.uint
     for n in range(1, layers):
         layer += luminance <= medium.brightest * ratio ** (n / layers)
     with np.errstate(divide="ignore"):
-        depth = np.log(medium.brightest / luminance) / -np.log(ratio)
+        depth = np.log(medium.brightest / luminance.astype(np.float64)) / -np.log(ratio)
     within = np.clip(depth * layers - (layer - 1.0), 0.0, 1.0)
     code = (layer - 1) * steps + np.minimum((within * steps).astype(np.int64), steps - 1)
     if version.record["settings"]["tails"] == "dropped":

@@ -240,7 +240,9 @@ def depth_code(
     steps = code_steps(layers)
     layer = layer_of(luminance, attenuation, layers, tails=tails, opaque=opaque)
     with np.errstate(divide="ignore"):
-        depth = np.log(attenuation.brightest / luminance) / attenuation.coefficient
+        # In double precision: readers of packages compute the same codes in their own way.
+        ratio = attenuation.brightest / luminance.astype(np.float64)
+        depth = np.log(ratio) / attenuation.coefficient
     within = np.clip(depth * layers - (layer - 1.0), 0.0, 1.0)
     step = np.minimum((within * steps).astype(np.int64), steps - 1)
     code = (layer.astype(np.int64) - 1) * steps + step

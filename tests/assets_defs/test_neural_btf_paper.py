@@ -15,6 +15,7 @@ MATERIAL = {"material": "silk"}
 SHORT = {
     "steps": 300,
     "file_steps": 200,
+    "latents": 8,
     "encoder_steps": 40,
     "texels": 100,
     "frames": 1,
