@@ -1,18 +1,9 @@
-"""Errors of a compressed BTF over all that was measured, and how large the values are."""
+"""How large a BTF's values are."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
-from pipelines.light.directions import Pairs
-from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.restoration import restoration_errors
-
-
-def btf_rmse(stored: CompressedBtf, abrdfs: NDArray[np.float16], pairs: Pairs) -> float:
-    """RMSE of all restored ABRDFs (texel, image, 3), over alpha."""
-    return restoration_errors(stored, lambda a, b: abrdfs[a:b], pairs, block=400).rmse
 
 
 def value_spread(abrdfs: NDArray[np.float16]) -> tuple[float, float]:

@@ -73,8 +73,7 @@ def result_path(material: str, seed: int) -> Path:
 
 
 def committed_figures() -> dict[str, Any]:
-    """Means over the materials of seed 0, of what is committed; what each run has; the seeds'
-    spread."""
+    """Means over the materials of seed 0, of what is committed, and what each run has."""
     paths = {run: result_path(*run) for run in RUNS}
     runs = {run: json.loads(path.read_text()) for run, path in paths.items() if path.exists()}
     found: dict[str, Any] = {"materials": [material for material, seed in runs if seed == 0]}

@@ -37,8 +37,7 @@ _DISTANCES = (0.35, 0.9, 2.4, 6.0)
 
 
 def draw_zooms(btf: CompressedBtf, tile: tuple[float, float]) -> NDArray[np.uint8]:
-    """The cloth from four distances, with coarser levels above, without below; two samples a pixel
-    of each kind there, as a game would take."""
+    """The cloth from four distances, with coarser levels above, without below."""
     scene, lighting = draped_scene(), lighting_of(daylight())
     shading = floor_shading(scene, lighting, 64, 4 * _SAMPLES)
     table = importance_table(btf)
