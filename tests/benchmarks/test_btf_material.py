@@ -42,7 +42,7 @@ def test_rows_belong_to_their_forms_and_beat_what_knows_nothing(tmp_path: Path) 
     for name, rival in found["rivals"].items():
         if name not in ("flat", "grey"):
             assert rival["bytes"] <= found["file_bytes"]
-    errors = found["cloth_rmse_to_raw"]
+    errors = found["cloth_rmse_to_none"]
     assert errors["file"]["whole"] < 0.8 * errors["flat"]["whole"]
 
 

@@ -193,7 +193,7 @@ def test_a_btf_runs_in_two_columns(home: Path) -> None:
     by_column = ("abrdf_clusters", "neural_btf", "compressed_btf", "restored_images")
     assert set(assets) == {f"neural_btf/{name}/silk" for name in ("btf_images", "abrdf_matrix")} | {
         f"neural_btf/{name}/{clusters}.silk"
-        for name in (*by_column, "cloth_frames", "rate_distortion")
+        for name in (*by_column, "cloth_frames", "rate_distortion", "btf_package")
         for clusters in ("none", "20")
     }
     assert assets["neural_btf/restored_images/20.silk"]["figures"]["rmse_over_none"] <= 1.5
