@@ -90,7 +90,8 @@ def made(launcher: Launcher, material: str, plan: MaterialPlan, seed: int = 0) -
     slots = {n: BTF.slot(n, {d: keys[d] for d in BTF.plans[n].by}) for n in names}
     matrix, groups, network, file = (store.open(slots[name]).load() for name in names[:4])
     settings = FileSettings(**store.record(slots["compressed_btf"])["settings"] | plan.small)
-    work = WorkState(Path(launcher.workspace.root) / "small_files", f"{material}-{seed}")
+    name = f"{material}-{seed}-{settings.latents}-{settings.share:g}"
+    work = WorkState(Path(launcher.workspace.root) / "small_files", name)
     with timed(f"{material}: a smaller file"):
         small = quantised_network(settings, work, lambda _: None, matrix, groups, network)
     forms = {

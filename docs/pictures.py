@@ -5,7 +5,6 @@ Launches what the pictures show, at the demo's sizes: more partitions than the d
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +49,6 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
 }
 """Keys by dimension of what the pictures show."""
 GIVEN: dict[System, dict[str, int]] = {
-    BTF: {"width": 480, "cloth_samples": 96},
     STREET: {"frames": 18},
 }
 """Settings that differ from the demo's."""
@@ -81,7 +79,7 @@ def make_pictures(store: VersionedStore) -> None:
             FOLDER / f"btf-{name}.png", optimize=True
         )
     _moving("btf-wall.webp", _wall(store)[:, ::2, ::2])
-    _cloths(store, materials)
+    _curve(store)
     _scratches(store)
     _lighting(store)
     _street(store)
@@ -217,15 +215,9 @@ def _shown(
     return made[name]
 
 
-def _cloths(store: VersionedStore, materials: Sequence[str]) -> None:
-    """Each cloth from a hand's breadth, and whole below."""
-    keys = [{"material": material, "clusters": "none"} for material in materials]
-    rows = [
-        np.hstack([_shown(store, BTF, "cloth_frames", one, name) for one in keys])
-        for name in ("close-up", "draped")
-    ]
-    Image.fromarray(np.vstack(rows)).save(FOLDER / "btf-cloths.jpg", quality=90, optimize=True)
-    curve = _shown(store, BTF, "rate_distortion", keys[0], "rate-distortion")
+def _curve(store: VersionedStore) -> None:
+    knit = {"material": "knit", "clusters": "none"}
+    curve = _shown(store, BTF, "rate_distortion", knit, "rate-distortion")
     Image.fromarray(curve).save(FOLDER / "btf-rate-distortion.png", optimize=True)
 
 
