@@ -22,12 +22,7 @@ from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import Camera, orbit
 from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
-from pipelines.neural_btf.draping.frames import (
-    CAMERA_AZIMUTH,
-    close_camera,
-    daylight,
-    whole_camera,
-)
+from pipelines.neural_btf.draping.frames import CAMERA_AZIMUTH, daylight, whole_camera
 from pipelines.neural_btf.draping.gathering import floor_shading, lighting_of
 from pipelines.neural_btf.draping.rendering import View, render
 from pipelines.neural_btf.draping.scene import draped_scene
@@ -50,7 +45,7 @@ def draw_cloths(btfs: list[CompressedBtf]) -> NDArray[np.uint8]:
     """Each cloth from a hand's breadth, and whole below."""
     rows = [
         np.hstack([_drawn([btf], camera, (480, 360))[0] for btf in btfs])
-        for camera in (close_camera(), whole_camera())
+        for camera in (_camera(_DISTANCES[0]), whole_camera())
     ]
     return np.vstack(rows)
 
