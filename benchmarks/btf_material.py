@@ -44,6 +44,8 @@ _LOOKUPS = 200_000
 _STEEPEST = 1.3
 """Radians from the normal."""
 FLAT = "flat"
+NULLS = (FLAT, "grey")
+"""Rivals that know nothing."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ def material_figures(run: MaterialRun, plan: MaterialPlan) -> dict[str, Any]:
     """All figures that one material has."""
     forms, rivals = rows_of_forms(run), rows_of_rivals(run, plan.rival_steps)
     file, float32 = forms["file"], forms["float32"]
-    real = {name: row for name, row in rivals.items() if name not in (FLAT, "grey")}
+    real = {name: row for name, row in rivals.items() if name not in NULLS}
     stored = run.btf("file")
     best = {what: min(row[what] for row in real.values()) for what in ("rmse", "flip")}
     by_texel = min(row["rmse"] for row in real.values() if row["by_texel"])

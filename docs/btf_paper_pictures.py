@@ -1,11 +1,14 @@
 """Make the pictures of paper-size BTFs: ``python -m docs.btf_paper_pictures``.
 
 Of what ``python -m benchmarks btf --scale paper`` made in the same data folder: four cloths, one of
-them at four zooms, and figure 8 with its crops."""
+them at four zooms and to the horizon, figure 8 with its crops; and what bytes buy, of what is
+committed."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +19,12 @@ from assets_defs.neural_btf.declaration import NONE
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.workspace import Workspace
 from benchmarks.btf_cloth import crops_sheet, tile_of
-from benchmarks.btf_columns import COLUMNS, draped_columns
+from benchmarks.btf_columns import COLUMNS, committed_columns, draped_columns
+from benchmarks.btf_material import NULLS
+from benchmarks.btf_paper_scale import MATERIALS, RUNS, result_path
 from docs.pictures import FOLDER
 from pipelines.drawing.colour import auto_exposure, to_8bit
+from pipelines.drawing.plots import canvas_picture, new_figure
 from pipelines.drawing.stage import Camera, orbit
 from pipelines.light.directions import unit_vectors
 from pipelines.neural_btf.compressed import CompressedBtf
@@ -73,6 +79,43 @@ def draw_levels(btf: CompressedBtf) -> NDArray[np.uint8]:
     return np.vstack([to_8bit(p.reshape(height, width, 3) * exposure) for p in pictures])
 
 
+def draw_bytes(runs: dict[str, dict[str, Any]], columns: dict[str, Any]) -> NDArray[np.uint8]:
+    """Bytes and error of every form and rival, of committed ``runs`` by material and seed ("knit
+    0") and committed ``columns`` by material."""
+    materials = [name.removesuffix(" 0") for name in runs if name.endswith(" 0")]
+    figure, canvas = new_figure(3.6 * len(materials), 4.2)
+    axes = figure.subplots(1, len(materials), squeeze=False)[0]
+    for axis, material in zip(axes, materials, strict=True):
+        first = runs[f"{material} 0"]
+        rivals = {name: row for name, row in first["rivals"].items() if name not in NULLS}
+        below = 0.0
+        for name, row in sorted(rivals.items(), key=lambda rival: float(rival[1]["rmse"])):
+            at = row["bytes"] / 1e3, row["rmse"]
+            axis.plot(*at, "x", color="tab:red")
+            up = 4 if row["rmse"] < 1.05 * below else -4
+            axis.annotate(name.replace("_", " "), at, ha="right", **_beside(-6, up))
+            below = row["rmse"]
+        axis.axhline(first["rivals"]["flat"]["rmse"], color="black", lw=0.8, ls="--")
+        for seed, mark in ((0, "o"), (1, "v")):
+            forms = runs.get(f"{material} {seed}", {}).get("forms", {})
+            for name, row in forms.items():
+                at = row["bytes"] / 1e3, row["rmse"]
+                axis.plot(*at, mark, color="tab:green", fillstyle="none")
+                if seed == 0:
+                    axis.annotate(name, at, **_beside(6))
+        for name in COLUMNS if material in columns else ():
+            at = columns[material]["bytes"][name] / 1e3, columns[material]["rmse"][name]
+            axis.plot(*at, "s", color="tab:blue", fillstyle="none")
+            axis.annotate(f"k={name}", at, **_beside(6))
+        axis.set(title=material, xlabel="kB", xscale="log", xlim=(20, 1000))
+        axis.set_xticks([25, 50, 100, 200, 400], ["25", "50", "100", "200", "400"], minor=False)
+        axis.set_xticks([], minor=True)
+        axis.set_ylim(0.0)
+        axis.grid(alpha=0.3, which="both")
+    axes[0].set_ylabel("RMSE over alpha; dashed: a colour a photograph")
+    return canvas_picture(canvas)
+
+
 def _camera(distance: float) -> Camera:
     return orbit(_FOCUS, distance, CAMERA_AZIMUTH - 4.0, 30.0, view_angle=24.0)
 
@@ -94,6 +137,15 @@ def _file(store: VersionedStore, material: str) -> CompressedBtf:
     return compressed_btf_of(store.open(BTF.slot("compressed_btf", keys)).load())
 
 
+def _beside(right: int, up: int = -3) -> dict[str, Any]:
+    return {"xytext": (right, up), "textcoords": "offset points", "fontsize": 7}
+
+
+def _committed_runs() -> dict[str, dict[str, Any]]:
+    paths = {f"{material} {seed}": result_path(material, seed) for material, seed in RUNS}
+    return {name: json.loads(path.read_text()) for name, path in paths.items() if path.exists()}
+
+
 def main(folder: Path = FOLDER) -> None:
     """Write all that the data folder has the versions of."""
     store = Workspace(Workspace.from_environment().root / "benchmarks").store
@@ -105,6 +157,8 @@ def main(folder: Path = FOLDER) -> None:
     levels.save(folder / "btf-levels.png", optimize=True)
     zooms = Image.fromarray(draw_zooms(_file(store, "knit")))
     zooms.save(folder / "btf-zooms.jpg", quality=90, optimize=True)
+    curve = draw_bytes(_committed_runs(), committed_columns(MATERIALS))
+    Image.fromarray(curve).save(folder / "btf-bytes.png", optimize=True)
     if all(f"{column}.knit" in known for column in COLUMNS):
         crops = Image.fromarray(crops_sheet(draped_columns(store, "knit")))
         crops.save(folder / "btf-crops.png", optimize=True)
