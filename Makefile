@@ -47,10 +47,11 @@ lint: setup      ## ruff, mypy, TypeScript
 	@$(VENV)/mypy
 	@$(NODE) node_modules/typescript/bin/tsc --noEmit
 
-docs: setup      ## docs/assets.md from the schemas; docs/inputs.md, docs/packages.md; docs/pictures/, made for the pages
+docs: setup      ## docs/assets.md from the schemas; docs/inputs.md, docs/packages.md, docs/btf_figures.md; docs/pictures/, made for the pages
 	@$(VENV)/python -m docs.assets
 	@$(VENV)/python -m docs.inputs
 	@$(VENV)/python -m docs.packages
+	@$(VENV)/python -m docs.btf_figures
 	@$(VENV)/python -m docs.pictures
 	@$(VENV)/python -m docs.textured_scene
 	@$(VENV)/python -m docs.viewer_pictures
