@@ -56,8 +56,9 @@ _ROWS = """
 
 Bytes are of the file as it is written, memory of arrays as they run, in float32. RMSE is over
 alpha, the same over the deviation of all values; of views of 60 degrees and more over that of the
-mean ABRDF; of the worst tenth of photographs over the deviation. PSNR, SSIM, FLIP are of tone-mapped
-photographs. Million lookups a second, at places between texels, were measured beside other work.
+mean ABRDF; of the worst tenth of photographs over the deviation. PSNR, SSIM and FLIP are of
+tone-mapped photographs. Million lookups a second, at places between texels, were measured beside
+other work.
 """
 _COLUMNS = (
     *("", "bytes", "memory", "Mlookups/s", "RMSE", "over deviation", "at 60°", "worst"),
