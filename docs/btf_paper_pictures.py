@@ -146,11 +146,30 @@ def _committed_runs() -> dict[str, dict[str, Any]]:
     return {name: json.loads(path.read_text()) for name, path in paths.items() if path.exists()}
 
 
+def _picture(store: VersionedStore, asset: str, keys: dict[str, str], name: str) -> Image.Image:
+    pictures = BTF.plans[asset].pictures
+    assert pictures is not None
+    return Image.fromarray(pictures(store.open(BTF.slot(asset, keys)))[name])
+
+
+def _write_stored(store: VersionedStore, cloths: list[str], folder: Path) -> None:
+    """Write pictures that assets have themselves."""
+    knit = {"material": "knit", "clusters": NONE}
+    for name in ("restored", "errors"):
+        picture = _picture(store, "restored_images", knit, name)
+        picture.save(folder / f"btf-{name}.png", optimize=True)
+    curve = _picture(store, "rate_distortion", knit, "rate-distortion")
+    curve.save(folder / "btf-rate-distortion.png", optimize=True)
+    rows = [_picture(store, "btf_images", {"material": m}, "photographs") for m in cloths]
+    Image.fromarray(np.vstack(rows)).save(folder / "btf-photographs.png", optimize=True)
+
+
 def main(folder: Path = FOLDER) -> None:
     """Write all that the data folder has the versions of."""
     store = Workspace(Workspace.from_environment().root / "benchmarks").store
     known = {slot.partition for slot in store.slots() if slot.asset == "compressed_btf"}
     cloths = [m for m in BTF.dimension("material").builtin if f"{NONE}.{m}" in known]
+    _write_stored(store, cloths, folder)
     files = [_file(store, material) for material in cloths]
     Image.fromarray(draw_cloths(files)).save(folder / "btf-cloths.jpg", quality=90, optimize=True)
     levels = Image.fromarray(draw_levels(_file(store, "knit")))

@@ -1,6 +1,7 @@
 """Make docs/pictures/: ``make docs``.
 
-Launches what the pictures show, at the demo's sizes: more partitions than the demo has."""
+Launches what the pictures show, at the demo's sizes: more partitions than the demo has. Those of
+BTFs are of paper size: `docs.btf_paper_pictures`."""
 
 from __future__ import annotations
 
@@ -14,7 +15,6 @@ from PIL import Image
 
 from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.launcher import Request
-from assets_defs.neural_btf.graph import BTF
 from assets_defs.photo_fur.graph import FUR
 from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.street_billboards.datasets import billboards_of, pages_of, views_of
@@ -35,10 +35,6 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
     FUR: {
         "photo": ("grass", "chelsea", "pelt"),
         "mesh": ("square", "teapot", "teapot-large"),
-    },
-    BTF: {
-        "material": BTF.dimension("material").builtin,
-        "clusters": ("none", "100"),
     },
     SCRATCHES: {
         "setting": SCRATCHES.dimension("setting").builtin,
@@ -68,18 +64,6 @@ def make_pictures(store: VersionedStore) -> None:
     _row("fur-square.jpg", *_frames(store, "square", "pelt"))
     _row("fur-three.jpg", *(pictures[0] for pictures in frames.values()))
     _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
-    materials = SHOWN[BTF]["material"]
-    _column(
-        "btf-photographs.png",
-        *(_shown(store, BTF, "btf_images", {"material": material}) for material in materials),
-    )
-    knit = {"material": "knit", "clusters": "100"}
-    for name in ("restored", "errors"):
-        Image.fromarray(_shown(store, BTF, "restored_images", knit, name)).save(
-            FOLDER / f"btf-{name}.png", optimize=True
-        )
-    _moving("btf-wall.webp", _wall(store)[:, ::2, ::2])
-    _curve(store)
     _scratches(store)
     _lighting(store)
     _street(store)
@@ -213,17 +197,6 @@ def _shown(
     if name is None:
         (name,) = made
     return made[name]
-
-
-def _curve(store: VersionedStore) -> None:
-    knit = {"material": "knit", "clusters": "none"}
-    curve = _shown(store, BTF, "rate_distortion", knit, "rate-distortion")
-    Image.fromarray(curve).save(FOLDER / "btf-rate-distortion.png", optimize=True)
-
-
-def _wall(store: VersionedStore) -> NDArray[np.uint8]:
-    assert BTF.overview is not None
-    return BTF.overview(store, list(store.slots()))["wall-none"]
 
 
 def _moving(name: str, frames: NDArray[np.uint8]) -> None:
