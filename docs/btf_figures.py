@@ -168,8 +168,8 @@ def _bytes(count: int) -> str:
 
 
 def _number(value: float) -> str:
-    if isinstance(value, int) or value == round(value):
-        return _bytes(int(value))
+    if isinstance(value, int) or value == round(value) or value > 1000:
+        return _bytes(round(value))
     return f"{value:.3g}" if value < 0.01 else f"{value:.4f}" if value < 0.1 else f"{value:.3f}"
 
 
