@@ -93,7 +93,7 @@ def draw_bytes(runs: dict[str, dict[str, Any]], columns: dict[str, Any]) -> NDAr
             at = row["bytes"] / 1e3, row["rmse"]
             axis.plot(*at, "x", color="tab:red")
             up = 4 if row["rmse"] < 1.05 * below else -4
-            axis.annotate(name.replace("_", " "), at, ha="right", **_beside(-6, up))
+            axis.annotate(name.replace("_", " "), at, **_beside(6, up))
             below = row["rmse"]
         axis.axhline(first["rivals"]["flat"]["rmse"], color="black", lw=0.8, ls="--")
         for seed, mark in ((0, "o"), (1, "v")):
@@ -102,7 +102,7 @@ def draw_bytes(runs: dict[str, dict[str, Any]], columns: dict[str, Any]) -> NDAr
                 at = row["bytes"] / 1e3, row["rmse"]
                 axis.plot(*at, mark, color="tab:green", fillstyle="none")
                 if seed == 0:
-                    axis.annotate(name, at, **_beside(6))
+                    axis.annotate(name, at, ha="right", **_beside(-6))
         for name in COLUMNS if material in columns else ():
             at = columns[material]["bytes"][name] / 1e3, columns[material]["rmse"][name]
             axis.plot(*at, "s", color="tab:blue", fillstyle="none")
@@ -173,7 +173,7 @@ def main(folder: Path = FOLDER) -> None:
     files = [_file(store, material) for material in cloths]
     Image.fromarray(draw_cloths(files)).save(folder / "btf-cloths.jpg", quality=90, optimize=True)
     levels = Image.fromarray(draw_levels(_file(store, "knit")))
-    levels.save(folder / "btf-levels.png", optimize=True)
+    levels.save(folder / "btf-levels.jpg", quality=90, optimize=True)
     zooms = Image.fromarray(draw_zooms(_file(store, "knit")))
     zooms.save(folder / "btf-zooms.jpg", quality=90, optimize=True)
     curve = draw_bytes(_committed_runs(), committed_columns(MATERIALS))
