@@ -196,7 +196,7 @@ def test_a_btf_runs_in_two_columns(home: Path) -> None:
         for name in (*by_column, "cloth_frames", "rate_distortion", "btf_package")
         for clusters in ("none", "20")
     }
-    assert assets["neural_btf/restored_images/20.silk"]["figures"]["rmse_over_none"] <= 1.5
+    assert 1.0 < assets["neural_btf/restored_images/20.silk"]["figures"]["rmse_over_none"] <= 3.0
     assert "rmse_over_none" not in assets["neural_btf/restored_images/none.silk"]["figures"]
     made = _files(home / "data" / "store" / "neural_btf")
     for clusters in ("007", "0", "-3", "many"):
