@@ -7,6 +7,7 @@ committed."""
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from assets_defs.neural_btf.datasets import compressed_btf_of
+from assets_defs.neural_btf.datasets import compressed_btf_of, pairs_of
 from assets_defs.neural_btf.declaration import NONE
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.workspace import Workspace
-from benchmarks.btf_cloth import crops_sheet, tile_of
-from benchmarks.btf_columns import COLUMNS, committed_columns, draped_columns
+from benchmarks.btf_cloth import REFERENCE, crops_sheet, tile_of
+from benchmarks.btf_columns import COLUMNS, FILE, committed_columns, draped_columns, stored_forms
 from benchmarks.btf_material import NULLS
 from benchmarks.btf_paper_scale import MATERIALS, RUNS, result_path
 from docs.pictures import FOLDER
@@ -33,7 +34,7 @@ from pipelines.neural_btf.draping.gathering import floor_shading, lighting_of
 from pipelines.neural_btf.draping.rendering import View, render
 from pipelines.neural_btf.draping.scene import draped_scene
 from pipelines.neural_btf.importance import importance_table
-from pipelines.neural_btf.material import surface_radiance
+from pipelines.neural_btf.material import Material, MeasuredBtf, surface_radiance
 from storage.versions import VersionedStore
 
 _FOCUS = (0.25, 0.40, 0.98)
@@ -50,7 +51,7 @@ _SAMPLES = 128
 def draw_cloths(btfs: list[CompressedBtf]) -> NDArray[np.uint8]:
     """Each cloth from a hand's breadth, and whole below."""
     rows = [
-        np.hstack([_drawn([btf], camera, (480, 360))[0] for btf in btfs])
+        np.hstack([_drawn(btf, camera, (480, 360))[0] for btf in btfs])
         for camera in (_camera(_DISTANCES[0]), whole_camera())
     ]
     return np.vstack(rows)
@@ -59,7 +60,7 @@ def draw_cloths(btfs: list[CompressedBtf]) -> NDArray[np.uint8]:
 def draw_zooms(btf: CompressedBtf) -> NDArray[np.uint8]:
     """The cloth from a hand's breadth to six metres."""
     cameras = [_camera(distance) for distance in _DISTANCES]
-    return np.hstack([_drawn([btf], camera, (400, 300))[0] for camera in cameras])
+    return np.hstack([_drawn(btf, camera, (400, 300))[0] for camera in cameras])
 
 
 def draw_levels(btf: CompressedBtf) -> NDArray[np.uint8]:
@@ -120,14 +121,27 @@ def _camera(distance: float) -> Camera:
     return orbit(_FOCUS, distance, CAMERA_AZIMUTH - 4.0, 30.0, view_angle=24.0)
 
 
+def draw_clusters(store: VersionedStore, material: str) -> NDArray[np.uint8]:
+    """A cloth from a hand's breadth: measured, the network, its clusters, the file."""
+    images = store.open(BTF.slot("btf_images", {"material": material}))
+    forms = stored_forms(store, material)
+    measured = MeasuredBtf(images["images"].values, pairs_of(images))
+    shown = [measured, *(forms[name] for name in (REFERENCE, COLUMNS[0], COLUMNS[-1], FILE))]
+    return np.hstack(_drawn(forms[FILE], _camera(_DISTANCES[0]), (400, 400), shown))
+
+
 def _drawn(
-    btfs: list[CompressedBtf], camera: Camera, size: tuple[int, int], samples: int = _SAMPLES
+    btf: CompressedBtf,
+    camera: Camera,
+    size: tuple[int, int],
+    materials: Sequence[Material] = (),
 ) -> list[NDArray[np.uint8]]:
-    """Pictures of BTFs, exposed for the first one's cloth."""
+    """Pictures of materials, of the BTF alone where there are none, from the BTF's directions and
+    exposed for the first one's cloth."""
     scene, lighting = draped_scene(), lighting_of(daylight())
-    shading = floor_shading(scene, lighting, 96, 4 * samples)
-    view = View(camera, size, samples, tile_of(btfs[0].height, btfs[0].width))
-    taken = render(scene, lighting, shading, btfs, importance_table(btfs[0]), view)
+    shading = floor_shading(scene, lighting, 96, 4 * _SAMPLES)
+    view = View(camera, size, _SAMPLES, tile_of(btf.height, btf.width))
+    taken = render(scene, lighting, shading, materials or [btf], importance_table(btf), view)
     exposure = auto_exposure(taken.pictures[0][taken.cloth == 1.0])
     return [to_8bit(picture * exposure) for picture in taken.pictures]
 
@@ -181,6 +195,8 @@ def main(folder: Path = FOLDER) -> None:
     if all(f"{column}.knit" in known for column in COLUMNS):
         crops = Image.fromarray(crops_sheet(draped_columns(store, "knit")))
         crops.save(folder / "btf-crops.png", optimize=True)
+        clusters = Image.fromarray(draw_clusters(store, "knit"))
+        clusters.save(folder / "btf-clusters.jpg", quality=90, optimize=True)
 
 
 if __name__ == "__main__":
