@@ -19,6 +19,7 @@ from assets_defs.neural_btf.datasets import compressed_btf_of, pairs_of
 from assets_defs.neural_btf.declaration import NONE
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.workspace import Workspace
+from benchmarks import btf_paper_training
 from benchmarks.btf_cloth import REFERENCE, crops_sheet, tile_of
 from benchmarks.btf_columns import COLUMNS, FILE, committed_columns, draped_columns, stored_forms
 from benchmarks.btf_material import NULLS
@@ -117,6 +118,25 @@ def draw_bytes(runs: dict[str, dict[str, Any]], columns: dict[str, Any]) -> NDAr
     return canvas_picture(canvas)
 
 
+def draw_training(done: dict[str, dict[str, Any]], fast: float) -> NDArray[np.uint8]:
+    """Errors of the batches of the paper's longest training over processor seconds; ``fast`` is
+    what fast training reaches."""
+    longest = max(done.values(), key=lambda run: float(run["cpu_seconds"]))
+    seconds, _, errors = np.array(longest["curve"]).T
+    figure, canvas = new_figure(6.4, 3.2)
+    axis = figure.subplots()
+    axis.plot(seconds / 60, errors, color="tab:blue", label="training=paper, its batches")
+    axis.plot(longest["cpu_seconds"] / 60, longest["rmse"], "o", label="all photographs")
+    axis.axhline(
+        longest["rmse_null"], color="black", lw=0.8, ls="--", label="a colour a photograph"
+    )
+    axis.axhline(fast, color="tab:green", lw=0.8, label="training=fast, after six minutes")
+    axis.set(xlabel="processor minutes", ylabel="RMSE over alpha", ylim=(0.0, None))
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize=8)
+    return canvas_picture(canvas)
+
+
 def _camera(distance: float) -> Camera:
     return orbit(_FOCUS, distance, CAMERA_AZIMUTH - 4.0, 30.0, view_angle=24.0)
 
@@ -192,6 +212,10 @@ def main(folder: Path = FOLDER) -> None:
     zooms.save(folder / "btf-zooms.jpg", quality=90, optimize=True)
     curve = draw_bytes(_committed_runs(), committed_columns(MATERIALS))
     Image.fromarray(curve).save(folder / "btf-bytes.png", optimize=True)
+    training = json.loads(btf_paper_training.RESULTS.read_text())
+    fast = committed_columns(("knit",))["knit"]["rmse"][REFERENCE]
+    curve = draw_training(training, fast)
+    Image.fromarray(curve).save(folder / "btf-training.png", optimize=True)
     if all(f"{column}.knit" in known for column in COLUMNS):
         crops = Image.fromarray(crops_sheet(draped_columns(store, "knit")))
         crops.save(folder / "btf-crops.png", optimize=True)
