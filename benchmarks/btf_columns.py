@@ -74,18 +74,21 @@ def column_figures(store: VersionedStore, material: str) -> dict[str, Any]:
     sizes[REFERENCE] = table_bytes(texels, texels)
     sizes[FILE] = store.open(_slot("compressed_btf", material, NONE)).sizes["byte"]
     with timed(f"{material}: draped cloth"):
-        cloth = cloth_errors(draped_columns(store, material))
+        cloth = cloth_errors(draped_columns(measured_btf(store, material), forms))
     return {"texels": texels, "bytes": sizes, "rmse": errors, **cloth}
 
 
-def draped_columns(store: VersionedStore, material: str) -> DrapedCloths:
+def draped_columns(measured: MeasuredBtf, forms: dict[str, CompressedBtf]) -> DrapedCloths:
     """Figure 8: the measured BTF, networks with and without clusters, the file."""
+    shown: dict[str, Material] = {RAW: measured, **forms}
+    tile = tile_of(forms[FILE].height, forms[FILE].width)
+    return draped_cloths(shown, tile, width=_WIDTH, samples=_SAMPLES)
+
+
+def measured_btf(store: VersionedStore, material: str) -> MeasuredBtf:
+    """The photographs as they are."""
     images = store.open(BTF.slot("btf_images", {"material": material}))
-    forms = stored_forms(store, material)
-    size = next(iter(forms.values()))
-    shown: dict[str, Material] = {RAW: MeasuredBtf(images["images"].values, pairs_of(images))}
-    tile = tile_of(size.height, size.width)
-    return draped_cloths(shown | forms, tile, width=_WIDTH, samples=_SAMPLES)
+    return MeasuredBtf(images["images"].values, pairs_of(images))
 
 
 def stored_forms(store: VersionedStore, material: str) -> dict[str, CompressedBtf]:

@@ -23,9 +23,8 @@ from assets_defs.launcher import Launcher, Request
 from assets_defs.neural_btf.datasets import photograph_blocks
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.workspace import Workspace
-from benchmarks.btf_errors import mean_abrdf_rmse
 from benchmarks.btf_launching import opened_launcher, timed
-from benchmarks.btf_training import data_of_matrix, trained_rmse, training_speedup, warm_starts
+from benchmarks.btf_training import data_of_matrix, trained_errors, training_speedup, warm_starts
 from pipelines.neural_btf.clusters import AbrdfClusters, cluster_abrdfs, single_texel_clusters
 from pipelines.neural_btf.representatives import Representative
 from pipelines.neural_btf.training.plan import Targets, TrainingPlan
@@ -164,8 +163,7 @@ def _trained(one: Run, images: xr.Dataset, matrix: xr.Dataset, state: Path) -> d
     data, read = data_of_matrix(matrix, groups, plan)
     trained, spent, steps, curve = _against_the_clock(Trainer(data, plan), one.seconds, state)
     return {
-        "rmse": trained_rmse(trained, matrix, groups, read),
-        "rmse_null": mean_abrdf_rmse(read, len(matrix["abrdfs"])) / float(matrix["alpha"]),
+        **trained_errors(trained, matrix, groups, read),
         "cpu_seconds": round(spent),
         "steps": steps,
         "curve": curve,

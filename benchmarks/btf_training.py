@@ -6,6 +6,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from assets_defs.neural_btf.datasets import abrdf_reader, pairs_of
@@ -15,7 +16,9 @@ from pipelines.neural_btf.clusters import AbrdfClusters, single_texel_clusters
 from pipelines.neural_btf.compressed import compressed_btf
 from pipelines.neural_btf.decoder_arrays import direction_inputs
 from pipelines.neural_btf.network import decoder_arrays
-from pipelines.neural_btf.restoration import restoration_errors
+from pipelines.neural_btf.quality import error_figures
+from pipelines.neural_btf.quality_sums import compare
+from pipelines.neural_btf.restoration import restored_abrdfs
 from pipelines.neural_btf.training.data import AbrdfScale, TrainingData, training_data
 from pipelines.neural_btf.training.plan import TrainingPlan
 from pipelines.neural_btf.training.trainer import TrainedNetwork, train
@@ -39,16 +42,21 @@ def trained_rmse(
     trained: TrainedNetwork, matrix: xr.Dataset, groups: AbrdfClusters, read: AbrdfReader
 ) -> float:
     """RMSE over alpha of all photographs, in the paper's float32 form."""
-    stored = compressed_btf(
-        decoder_arrays(trained.decoder),
-        trained.latents,
-        groups.ids,
-        float(matrix["alpha"]),
-        _size_of(matrix),
-        trained.parallax,
-    )
+    return trained_errors(trained, matrix, groups, read)["rmse"]
+
+
+def trained_errors(
+    trained: TrainedNetwork, matrix: xr.Dataset, groups: AbrdfClusters, read: AbrdfReader
+) -> dict[str, float]:
+    """``rmse`` as `trained_rmse`, and ``rmse_null``: of the mean ABRDF, a colour a photograph."""
+    size, alpha, pairs = _size_of(matrix), float(matrix["alpha"]), pairs_of(matrix)
+    decoder = decoder_arrays(trained.decoder)
+    stored = compressed_btf(decoder, trained.latents, groups.ids, alpha, size, trained.parallax)
     held = replace(stored, least=0.0, largest=1.0)
-    return restoration_errors(held, read, pairs_of(matrix), block=400).rmse
+    restore = restored_abrdfs(held, pairs)
+    compared = compare(restore, read, pairs, size, judged=np.zeros(0, np.int64), block=400)
+    found = error_figures(compared, alpha)
+    return {name: found[name] for name in ("rmse", "rmse_null")}
 
 
 def _size_of(matrix: xr.Dataset) -> tuple[int, int]:

@@ -102,8 +102,9 @@ def _tables(columns: dict[str, Any]) -> Iterable[str]:
         yield _row(f"*{material}, the paper's*", [*values, None], "{:.4f}".format)
     yield _row("bytes", [columns[next(iter(columns))]["bytes"][name] for name in shown], _bytes)
     yield (
-        "\nThe materials are not the paper's, so its rows are neighbours, not rivals. Clusters are "
-        "replaced by their mean in this training: their representative has no effect here."
+        "\nThe materials are not the paper's, so its rows are neighbours, not rivals. Texels of a "
+        "cluster are replaced by their mean in this training: their representative has no effect. "
+        "Only none and the file look latents up by the view."
     )
     yield "\n## Tables 3 and 4: RMSE of the draped cloth's crops, to that of the network\n"
     shown = (*COLUMNS, FILE)

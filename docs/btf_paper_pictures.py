@@ -15,14 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from assets_defs.neural_btf.datasets import compressed_btf_of, pairs_of
+from assets_defs.neural_btf.datasets import compressed_btf_of
 from assets_defs.neural_btf.declaration import NONE
 from assets_defs.neural_btf.graph import BTF
 from assets_defs.workspace import Workspace
 from benchmarks import btf_paper_training
 from benchmarks.btf_cloth import REFERENCE, crops_sheet, tile_of
-from benchmarks.btf_columns import COLUMNS, FILE, committed_columns, draped_columns, stored_forms
-from benchmarks.btf_material import NULLS
+from benchmarks.btf_columns import (
+    COLUMNS,
+    FILE,
+    committed_columns,
+    draped_columns,
+    measured_btf,
+    stored_forms,
+)
+from benchmarks.btf_material import FLAT, NULLS
 from benchmarks.btf_paper_scale import MATERIALS, RUNS, result_path
 from docs.pictures import FOLDER
 from pipelines.drawing.colour import auto_exposure, to_8bit
@@ -97,7 +104,7 @@ def draw_bytes(runs: dict[str, dict[str, Any]], columns: dict[str, Any]) -> NDAr
             up = 4 if row["rmse"] < 1.05 * below else -4
             axis.annotate(name.replace("_", " "), at, **_beside(6, up))
             below = row["rmse"]
-        axis.axhline(first["rivals"]["flat"]["rmse"], color="black", lw=0.8, ls="--")
+        axis.axhline(first["rivals"][FLAT]["rmse"], color="black", lw=0.8, ls="--")
         for seed, mark in ((0, "o"), (1, "v")):
             forms = runs.get(f"{material} {seed}", {}).get("forms", {})
             for name, row in forms.items():
@@ -141,11 +148,8 @@ def _camera(distance: float) -> Camera:
     return orbit(_FOCUS, distance, CAMERA_AZIMUTH - 4.0, 30.0, view_angle=24.0)
 
 
-def draw_clusters(store: VersionedStore, material: str) -> NDArray[np.uint8]:
+def draw_clusters(measured: MeasuredBtf, forms: dict[str, CompressedBtf]) -> NDArray[np.uint8]:
     """A cloth from a hand's breadth: measured, the network, its clusters, the file."""
-    images = store.open(BTF.slot("btf_images", {"material": material}))
-    forms = stored_forms(store, material)
-    measured = MeasuredBtf(images["images"].values, pairs_of(images))
     shown = [measured, *(forms[name] for name in (REFERENCE, COLUMNS[0], COLUMNS[-1], FILE))]
     return np.hstack(_drawn(forms[FILE], _camera(_DISTANCES[0]), (400, 400), shown))
 
@@ -217,9 +221,10 @@ def main(folder: Path = FOLDER) -> None:
     curve = draw_training(training, fast)
     Image.fromarray(curve).save(folder / "btf-training.png", optimize=True)
     if all(f"{column}.knit" in known for column in COLUMNS):
-        crops = Image.fromarray(crops_sheet(draped_columns(store, "knit")))
+        columns = measured_btf(store, "knit"), stored_forms(store, "knit")
+        crops = Image.fromarray(crops_sheet(draped_columns(*columns)))
         crops.save(folder / "btf-crops.png", optimize=True)
-        clusters = Image.fromarray(draw_clusters(store, "knit"))
+        clusters = Image.fromarray(draw_clusters(*columns))
         clusters.save(folder / "btf-clusters.jpg", quality=90, optimize=True)
 
 

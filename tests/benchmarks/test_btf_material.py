@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.btf_launching import opened_launcher
-from benchmarks.btf_material import MaterialPlan, MaterialRun, made, material_figures
+from benchmarks.btf_material import NULLS, MaterialPlan, MaterialRun, made, material_figures
 from benchmarks.btf_paper_scale import HEADLINES, all_photographs
 from pipelines.neural_btf.restoration import restoration_errors
 from storage.btf_file import write_btf_file
@@ -40,7 +40,7 @@ def test_rows_belong_to_their_forms_and_beat_what_knows_nothing(tmp_path: Path) 
         assert found["forms"][form]["rmse"] == pytest.approx(_rmse(run, form), rel=1e-3)
     assert found["small_file_bytes"] < found["file_bytes"]
     for name, rival in found["rivals"].items():
-        if name not in ("flat", "grey"):
+        if name not in NULLS:
             assert rival["bytes"] <= found["file_bytes"]
     errors = found["cloth_rmse_to_none"]
     assert errors["file"]["whole"] < 0.95 * errors["flat"]["whole"]  # few texels, seen from far
