@@ -47,7 +47,7 @@ PLAN = MaterialPlan(
         "frames": 1,
         "cloth_samples": 2,
     },
-    small={"share": 0.15, "latents": 8},
+    small={"share": 0.15, "latents": 8, "student": False},
     rival_steps=1500,
     cloth=(160, 64),
 )

@@ -59,11 +59,15 @@ class FileSettings(Settings):
     )
     file_steps: int = Field(150, ge=1, description="Quantised: steps of gradient descent")
     file_rate: float = Field(0.003, gt=0.0, le=1.0, description="Quantised: learning rate")
+    student: bool = Field(
+        True,
+        description="Quantised: with a small decoder for live views; without, more bits for texels",
+    )
     file_seed: int = Field(0, ge=0, description="Quantised: seed of its batches")
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"file_steps": 200, "share": 0.25},
-        "paper": {"latents": 16, "file_steps": 8000, "file_rate": 0.01},
+        "paper": {"latents": 16, "file_steps": 16_000, "file_rate": 0.01},
     }
 
 
@@ -108,6 +112,7 @@ def fine_tuning_plan(settings: FileSettings, clusters: int, texels: int) -> Fine
         file_bytes=settings.share * figures.table_bytes(clusters, clusters) + index,
         steps=settings.file_steps,
         rate=settings.file_rate,
+        student=settings.student,
         seed=settings.file_seed,
     )
 

@@ -174,3 +174,12 @@ def encoder_of(vector: NDArray[np.float32], images: int, widths: Sequence[int]) 
 def device() -> torch.device:
     """A graphics card where there is one, else the CPU."""
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def autocast(on: torch.device) -> torch.autocast:
+    """Products in bfloat16 where there are instructions for it, else in single precision.
+
+    Without them, as on processors with AVX2 alone, bfloat16 takes ten times as long.
+    """
+    fast = on.type != "cpu" or torch.backends.cpu.get_cpu_capability() == "AVX512"
+    return torch.autocast(on.type, torch.bfloat16, enabled=fast)

@@ -24,7 +24,7 @@ from torch.nn.utils import parametrize
 from pipelines.neural_btf.decoder_arrays import STUDENT_HIDDEN
 from pipelines.neural_btf.latent_texture import averaged, level_sizes
 from pipelines.neural_btf.mips import AveragedAbrdfs
-from pipelines.neural_btf.network import Decoder, device
+from pipelines.neural_btf.network import Decoder, autocast, device
 from pipelines.neural_btf.training.batches import Batches
 from pipelines.neural_btf.training.data import TrainingData
 from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
@@ -85,7 +85,7 @@ class QuantisedNetwork(NamedTuple):
     parallax: NDArray[np.float32] | None
     """(9, 2)."""
     student: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]]
-    """A smaller decoder of the same latents."""
+    """A smaller decoder of the same latents; empty where the plan has none."""
     curve_step: NDArray[np.int64]
     curve_rmse: NDArray[np.float64]
     """Root of the mean squared error since the point before, values over alpha."""
@@ -151,15 +151,14 @@ class FineTuning:
         self.mips = self._parameter(_coarse_latents(latents, data))
         self.of_latents = self._quantiser(self.latents, "latents")
         self.of_mips = self._quantiser(self.mips, "mips")
-        self.student = quantised_decoder(Decoder(STUDENT_HIDDEN, latents.shape[1]))
-        self.student.to(self._device).train()
-        weights, small = unrounded(self.decoder), unrounded(self.student)
+        self.student = _student(latents.shape[1]).to(self._device) if plan.student else None
         self._optimisers = [
-            *decoder_optimisers(weights, [self.latents, self.mips], plan.rate),
-            *decoder_optimisers(small, [], _STUDENT_RATE),
+            *decoder_optimisers(unrounded(self.decoder), [self.latents, self.mips], plan.rate),
             parallax_optimiser(self.parallax, plan.rate),
             adam(self._log_steps(), _STEP_RATE),
         ]
+        if self.student is not None:
+            self._optimisers += decoder_optimisers(unrounded(self.student), [], _STUDENT_RATE)
         self._rates = [optimiser.defaults["lr"] for optimiser in self._optimisers]
         self._latent_price = LatentPrice(self.latents.shape[1], 2, self._device)
         self.steps_done = 0
@@ -227,7 +226,8 @@ class FineTuning:
     # ---- losses ------------------------------------------------------------------------------
 
     def _errors(self, random: np.random.Generator) -> tuple[Tensor, Tensor]:
-        """Mean squared error of the finest level on a batch, over alpha, and the student's."""
+        """Mean squared error of the finest level on a batch, over alpha, and the student's (0
+        without one)."""
         images = self._batches.images_by_view(random, self._plan.batch_images)
         batch = self._batches.rows(random, self.steps_done, self._plan.batch_texels, images.ravel())
         owners = torch.from_numpy(batch.owners).to(self._device)
@@ -266,17 +266,20 @@ class FineTuning:
         wanted = wanted / self._data.scale.alpha
 
         def error(decoder: Decoder, given: Tensor) -> Tensor:
-            with torch.autocast(self._device.type, torch.bfloat16):
+            with autocast(self._device):
                 colours = decoder.grid_by_view(given, directions)
             return ((colours.float() - wanted) ** 2).mean()
 
-        of_student = error(self.student, latents.detach())  # latents are the whole decoder's
-        return error(self.decoder, latents), of_student
+        of_decoder = error(self.decoder, latents)
+        if self.student is None:
+            return of_decoder, torch.zeros_like(of_decoder)
+        # latents are the whole decoder's
+        return of_decoder, error(self.student, latents.detach())
 
     def _bits(self) -> Tensor:
         """What decoders and latents take in the file."""
         total = torch.zeros((), device=self._device)
-        for decoder in (self.decoder, self.student):
+        for decoder in self._decoders():
             for quantiser, original in quantised_parts(decoder).values():
                 total = total + quantiser.bits(original)
         finest, coarse = self._whole_levels()
@@ -318,7 +321,7 @@ class FineTuning:
             tuple(np.split(symbols, self._level_ends()[:-1])) if self._sizes else (),
             self.of_mips.steps(),
             self.parallax.detach().cpu().numpy().copy() if self._has_parallax else None,
-            whole_numbers(self.student),
+            {} if self.student is None else whole_numbers(self.student),
             np.array([step for step, _ in self._curve], np.int64),
             np.array([value for _, value in self._curve], np.float64),
         )
@@ -331,8 +334,7 @@ class FineTuning:
         torch.save(
             {
                 "trained": {name: part.detach() for name, part in self._trained().items()},
-                "decoder": self.decoder.state_dict(),
-                "student": self.student.state_dict(),
+                "decoders": [decoder.state_dict() for decoder in self._decoders()],
                 "optimisers": [optimiser.state_dict() for optimiser in self._optimisers],
                 "coefficients": self._latent_price.coefficients,
                 "position": [self.steps_done, self._count],
@@ -346,8 +348,8 @@ class FineTuning:
     def restore(self, kept: bytes) -> None:
         """Go on from a state of the same data, network and plan."""
         saved = torch.load(io.BytesIO(kept), map_location=self._device, weights_only=True)
-        self.decoder.load_state_dict(saved["decoder"])
-        self.student.load_state_dict(saved["student"])
+        for decoder, state in zip(self._decoders(), saved["decoders"], strict=True):
+            decoder.load_state_dict(state)
         with torch.no_grad():
             for name, part in self._trained().items():
                 part.copy_(saved["trained"][name])
@@ -369,6 +371,9 @@ class FineTuning:
 
     # ---- making ------------------------------------------------------------------------------
 
+    def _decoders(self) -> list[Decoder]:
+        return [self.decoder] if self.student is None else [self.decoder, self.student]
+
     def _parameter(self, values: NDArray[np.float32]) -> Tensor:
         return torch.from_numpy(values.copy()).to(self._device).requires_grad_()
 
@@ -376,9 +381,13 @@ class FineTuning:
         return Quantiser(values, _FIRST_STEPS[kind], by_channel=True).to(self._device)
 
     def _log_steps(self) -> list[nn.Parameter]:
-        both = (quantised_parts(part).values() for part in (self.decoder, self.student))
-        parts = [quantiser for decoder in both for quantiser, _ in decoder]
+        every = (quantised_parts(decoder).values() for decoder in self._decoders())
+        parts = [quantiser for decoder in every for quantiser, _ in decoder]
         return [part.log_step for part in (*parts, self.of_latents, self.of_mips)]
+
+
+def _student(latents: int) -> Decoder:
+    return quantised_decoder(Decoder(STUDENT_HIDDEN, latents)).train()
 
 
 def _coarse_latents(latents: NDArray[np.float32], data: TrainingData) -> NDArray[np.float32]:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from pipelines.neural_btf.network import Decoder, Encoder
+from pipelines.neural_btf.training.muon import Muon
 from pipelines.neural_btf.training.plan import StageName
 
 _ENCODER_RATE = 2e-3
@@ -51,8 +52,7 @@ def decoder_optimisers(
     """
     hidden = [weights["weight_2"], weights["weight_3"]]
     others = [part for part in weights.values() if all(part is not matrix for matrix in hidden)]
-    muon = torch.optim.Muon(hidden, lr=rate, weight_decay=0.0)
-    return [adam([*others, *latents], rate), muon]
+    return [adam([*others, *latents], rate), Muon(hidden, lr=rate)]
 
 
 def parallax_optimiser(parallax: Tensor, rate: float) -> torch.optim.Optimizer:

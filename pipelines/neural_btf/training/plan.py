@@ -78,4 +78,6 @@ class FineTuningPlan:
     """Largest learning rate of the cycle."""
     batch_texels: int = 64
     batch_images: int = 128
+    student: bool = True
+    """Whether a second, smaller decoder of the same latents is trained, for the file to hold."""
     seed: int = 0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from pipelines.neural_btf.latent_texture import MONOMIALS
-from pipelines.neural_btf.network import Decoder, Encoder, default_widths, device
+from pipelines.neural_btf.network import Decoder, Encoder, autocast, default_widths, device
 from pipelines.neural_btf.training.batches import Batch, Batches
 from pipelines.neural_btf.training.data import TrainingData
 from pipelines.neural_btf.training.latent_lookup import latents_beside, parallax_offsets
@@ -200,7 +200,7 @@ class Trainer:
     def _encoder_loss(self, random: np.random.Generator) -> Tensor:
         batch = self._rows(random, self._plan.batch_texels)
         images = self._batches.images(random, self._plan.batch_images)
-        with self._autocast():
+        with autocast(self._device):
             latents = self.encoder(self._encoder_input(batch))
             colours = self.decoder.grid(latents.float(), self._directions[images])
         return self._error(colours, batch.values[:, images])
@@ -209,7 +209,7 @@ class Trainer:
         images = self._batches.images(random, self._plan.batch_images)
         batch = self._rows(random, self._plan.batch_texels, images)
         owners = torch.from_numpy(batch.owners).to(self._device)
-        with self._autocast():
+        with autocast(self._device):
             colours = self.decoder.grid(self.latents[owners], self._directions[images])
         return self._error(colours, batch.values)
 
@@ -220,13 +220,13 @@ class Trainer:
         views = self._directions[images[:, 0], 2:]
         offsets = parallax_offsets(self.parallax, views)
         latents = latents_beside(self.latents, self._data.size, texels, offsets)
-        with self._autocast():
+        with autocast(self._device):
             colours = self.decoder.grid_by_view(latents, self._directions[images])
         return self._error(colours, batch.values)
 
     def _distil_loss(self, random: np.random.Generator) -> Tensor:
         batch = self._rows(random, min(_ENCODE_ROWS, self._plan.batch_texels))
-        with self._autocast():
+        with autocast(self._device):
             found = self.encoder(self._encoder_input(batch))
         owners = torch.from_numpy(batch.owners).to(self._device)
         wanted = self.latents.detach()
@@ -236,9 +236,6 @@ class Trainer:
     def _error(self, colours: Tensor, values: NDArray[np.floating]) -> Tensor:
         wanted = torch.from_numpy(np.ascontiguousarray(values)).to(self._device).float()
         return ((colours.float() - wanted / self._data.scale.alpha) ** 2).mean()
-
-    def _autocast(self) -> torch.autocast:
-        return torch.autocast(self._device.type, torch.bfloat16)
 
     def _rows(
         self, random: np.random.Generator, count: int, images: NDArray[np.int64] | None = None

@@ -106,6 +106,23 @@ def test_a_rounded_network_is_as_good_as_the_float_one(clusters: int | None) -> 
     assert student < 0.9 * rmse(forgotten, wanted)
 
 
+def test_without_a_student_the_bits_go_to_the_texels() -> None:
+    data, trained, more, coarse = fitted()
+    wanted = transposed(photographs()).astype(np.float32)
+    plan = dataclasses.replace(PLAN, file_bytes=20_000)
+
+    def errors(student: bool) -> tuple[QuantisedNetwork, float]:
+        settings = dataclasses.replace(plan, student=student)
+        network = fine_tune(data, trained, more, coarse, settings, nominal_bytes)
+        return network, rmse(runtime(network, data), wanted)
+
+    (beside, with_it), (alone, without_it) = errors(True), errors(False)
+    assert beside.student
+    assert not alone.student
+    assert nominal_bytes(alone) < 1.1 * plan.file_bytes
+    assert without_it < 0.93 * with_it
+
+
 def latent_bytes(network: QuantisedNetwork) -> int:
     """A thousand bytes for each mean absolute symbol: what the decoder takes is left out."""
     levels = np.concatenate([network.latents, *network.mips])

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from pipelines.neural_btf.network import Decoder, Encoder
+from pipelines.neural_btf.training.muon import Muon
 from pipelines.neural_btf.training.optimisers import rate_share, stage_optimisers
 from pipelines.neural_btf.training.plan import StageName
 
@@ -36,7 +37,7 @@ def test_a_stage_trains_its_parts_each_parameter_once(
     expected = [part for name in trained for part in parts[name]]
     assert sorted(map(id, held)) == sorted(map(id, expected))
     assert {group["lr"] for one in found for group in one.param_groups} == rates
-    muon = [one for one in found if isinstance(one, torch.optim.Muon)]
+    muon = [one for one in found if isinstance(one, Muon)]
     hidden = [decoder.second.weight, decoder.third.weight]
     assert [part for one in muon for part in one.param_groups[0]["params"]] == (
         hidden if stage == "latents" else []
