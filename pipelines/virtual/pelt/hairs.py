@@ -1,9 +1,8 @@
 """Hairs of a patch of fur, grown as curves.
 
 The patch is the tile [0, 1] x [0, 1] of the plane z = 0 (the skin), continued periodically in x
-and y. One unit is the side of the tile. Hairs always stand equally dense in units of their own
-length (HAIRS_PER_SQUARE_LENGTH): fewer hairs are a smaller cut-out of the same fur, not sparser
-fur.
+and y. One unit is the side of the tile. Hairs of a kind always stand equally dense in units of
+their own length: fewer hairs are a smaller cut-out of the same fur, not sparser fur.
 
 Two populations, guard hairs and a finer, shorter, more unruly undercoat. A hair rises from its
 root, leans over towards its tip and follows the lie: a smooth periodic field of headings, to
@@ -26,12 +25,29 @@ from scipy.spatial import cKDTree
 FloatArray = NDArray[np.float32]
 
 # The fur. Lengths are in nominal hair lengths, angles in radians.
-HAIRS_PER_SQUARE_LENGTH = 800.0
 CLUMPS_PER_SQUARE_LENGTH = 18.0
 TUFTS_PER_SQUARE_LENGTH = 90.0
-UNDERCOAT_SHARE = 0.6
 POINTS_PER_HAIR = 12
-HUE = (0.49, 0.31, 0.165)  # albedo of a typical hair, linear RGB: golden brown
+
+
+class FurKind(NamedTuple):
+    """What kinds of fur differ in."""
+
+    hairs_per_square_length: float = 800.0
+    """Density: of a square as wide as a nominal hair is long."""
+    undercoat_share: float = 0.6
+    """Of the hairs."""
+    curl: float = 1.0
+    """Times a hair's waviness."""
+    tip_tilt: float = 67.0
+    """Degrees from upright, of a tip."""
+    colour_spread: float = 0.10
+    """Deviation of a hair's depth of hue, as a power."""
+    hue: tuple[float, float, float] = (0.49, 0.31, 0.165)
+    """Albedo of a typical hair, linear RGB: golden brown."""
+
+
+GOLDEN = FurKind()
 
 
 class Hairs(NamedTuple):
@@ -63,11 +79,10 @@ class _Coat(NamedTuple):
 _GUARD = _Coat(1.0, 0.0115, 0.12, 0.08, 0.25, 1.0, 0.75)
 _UNDERCOAT = _Coat(0.55, 0.0075, 0.35, 0.20, 0.40, 1.3, 0.50)
 
-_ROOT_TILT = math.radians(24.0)
-_TIP_TILT = math.radians(67.0)
+_ROOT_TILT = 24.0 / 67.0  # of the tip's
 
 
-def grow_hairs(count: int, rng: np.random.Generator) -> Hairs:
+def grow_hairs(count: int, rng: np.random.Generator, kind: FurKind = GOLDEN) -> Hairs:
     """Grow ``count`` hairs of two populations on the unit tile.
 
     Returns hairs of POINTS_PER_HAIR points. Raises ValueError for a count below 1.
@@ -78,14 +93,14 @@ def grow_hairs(count: int, rng: np.random.Generator) -> Hairs:
     """
     if count < 1:
         raise ValueError(f"hairs: expected at least 1, found {count}")
-    length = math.sqrt(HAIRS_PER_SQUARE_LENGTH / count)
+    length = math.sqrt(kind.hairs_per_square_length / count)
     roots = rng.random((count, 2))
-    kind = (rng.random(count) < UNDERCOAT_SHARE).astype(np.intp)
-    coat = _Coat(*np.array([_GUARD, _UNDERCOAT]).T[:, kind])
+    population = (rng.random(count) < kind.undercoat_share).astype(np.intp)
+    coat = _Coat(*np.array([_GUARD, _UNDERCOAT]).T[:, population])
     clump, clump_guides = _cells(roots, CLUMPS_PER_SQUARE_LENGTH / length**2, rng)
     tuft, tuft_guides = _cells(roots, TUFTS_PER_SQUARE_LENGTH / length**2, rng)
 
-    points = _curves(roots, length, coat, clump, rng)
+    points = _curves(roots, length, coat, clump, rng, kind)
     points = _draw_together(points, clump_guides[clump], coat.cohesion, 1.2, rng)
     points = _draw_together(points, tuft_guides[tuft], coat.cohesion, 1.5, rng)
 
@@ -93,9 +108,9 @@ def grow_hairs(count: int, rng: np.random.Generator) -> Hairs:
     taper = (1 - 0.85 * along**2.5) * (0.75 + 0.25 * np.minimum(1, 4 * along))
     thickness = length * coat.radius * rng.uniform(0.8, 1.25, count)
     clump_shade = rng.normal(0, 0.06, len(clump_guides))
-    shade = np.exp(rng.normal(0, 0.10, count) + clump_shade[clump])
+    shade = np.exp(rng.normal(0, kind.colour_spread, count) + clump_shade[clump])
     # A power of the hue, not a multiple: more pigment of the same kind (Beer), never above 1.
-    albedo = np.asarray(HUE) ** shade[:, None]
+    albedo = np.asarray(kind.hue) ** shade[:, None]
     return Hairs(
         points.astype(np.float32),
         (thickness[:, None] * taper).astype(np.float32),
@@ -114,21 +129,27 @@ def _cells(
 
 
 def _curves(
-    roots: np.ndarray, length: float, coat: _Coat, clump: np.ndarray, rng: np.random.Generator
+    roots: np.ndarray,
+    length: float,
+    coat: _Coat,
+    clump: np.ndarray,
+    rng: np.random.Generator,
+    kind: FurKind,
 ) -> np.ndarray:
     """Let hairs follow the lie of the fur from their roots: (H, P, 3)."""
     count, clumps = len(roots), int(clump.max()) + 1
     lie = _lie_of_the_fur(length, rng)
     turn = rng.normal(0, 0.22, clumps)[clump] + coat.turn_spread * rng.normal(0, 1, count)
     rise = rng.uniform(-0.12, 0.12, clumps)[clump]
-    root_tilt = _ROOT_TILT + rise + rng.uniform(-0.12, 0.12, count)
+    mean_tilt = math.radians(kind.tip_tilt)
+    root_tilt = _ROOT_TILT * mean_tilt + rise + rng.uniform(-0.12, 0.12, count)
     # Bounded scatter: a single upright or overlong hair would set the top plane for all others.
     spread = coat.tilt_spread * rng.uniform(-1.7, 1.7, count)
-    tip_tilt = _TIP_TILT + rise + spread
+    tip_tilt = mean_tilt + rise + spread
     step = length * coat.length / (POINTS_PER_HAIR - 1)
     step = step * rng.uniform(0.88, 1.12, clumps)[clump] * rng.uniform(0.82, 1.12, count)
     # Neighbours wave nearly in phase: locks, not frizz.
-    waviness = coat.waviness * rng.uniform(0.6, 1.4, clumps)[clump]
+    waviness = kind.curl * coat.waviness * rng.uniform(0.6, 1.4, clumps)[clump]
     phase = rng.uniform(0, 2 * math.pi, clumps)[clump] + rng.normal(0, 0.5, count)
     waves = coat.waves * rng.uniform(0.8, 1.2, count)
     bend = rng.normal(0, 0.25, count)

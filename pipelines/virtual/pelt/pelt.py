@@ -59,9 +59,9 @@ from scipy.ndimage import gaussian_filter
 from scipy.stats import qmc
 
 from pipelines.geometry.rays import first_hits, occluded
-from pipelines.virtual.pelt.hairs import FloatArray, Hairs, grow_hairs
+from pipelines.virtual.pelt.hairs import GOLDEN, FloatArray, FurKind, Hairs, grow_hairs
 from pipelines.virtual.pelt.prisms import PrismScene, build_prism_scene
-from pipelines.virtual.pelt.scattering import NUMBERS_PER_VERTEX, Scattered, scatter
+from pipelines.virtual.pelt.scattering import NUMBERS_PER_VERTEX, Scattered, Source, scatter
 
 SKIN_ALBEDO = (0.26, 0.16, 0.085)
 SOURCE_EXPONENT = 2.0
@@ -89,6 +89,7 @@ def make_pelt(
     hairs: int,
     samples: int,
     seed: int,
+    kind: FurKind = GOLDEN,
     *,
     progress: Callable[[float], None] | None = None,
 ) -> Pelt:
@@ -106,10 +107,19 @@ def make_pelt(
     The model is in the module's docstring; it is ours.
     """
     rng = np.random.default_rng(seed)
-    fur = grow_hairs(hairs, rng)
+    fur = grow_hairs(hairs, rng, kind)
     picture = photograph_hairs(fur, size, samples, rng, progress=progress)
-    white = max(float(np.quantile(picture.radiance.max(axis=-1), WHITE_QUANTILE)), 1e-6)
-    return picture._replace(radiance=np.minimum(picture.radiance / np.float32(white), 1))
+    return picture._replace(radiance=exposed(picture.radiance, white_of(picture.radiance)))
+
+
+def white_of(radiance: FloatArray) -> float:
+    """The radiance that an exposed photograph shows as white."""
+    return max(float(np.quantile(radiance.max(axis=-1), WHITE_QUANTILE)), 1e-6)
+
+
+def exposed(radiance: FloatArray, white: float) -> FloatArray:
+    """Radiance over ``white``, clipped at 1."""
+    return np.minimum(radiance / np.float32(white), 1)
 
 
 # --------------------------------------------------------------------------------------------
@@ -147,30 +157,68 @@ def photograph_hairs(
         if value < least:
             raise ValueError(f"{name}: expected at least {least}, found {value}")
     fur = build_prism_scene(hairs, skin_albedo)
+    depth = np.concatenate([_depth(fur, pixels, size) for pixels in _blocks(size * size)])
+
+    def rays(pixels: np.ndarray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        down = np.repeat(np.array([[0, 0, -1]], np.float32), len(pixels), axis=0)
+        return _camera_origins(pixels, size, place, fur.top), down
+
+    radiance = traced(
+        fur,
+        rays,
+        size * size,
+        samples,
+        Source(exponent=float(source_exponent)),
+        rng,
+        bounces=bounces,
+        progress=progress,
+    )
+    blurred = gaussian_filter(
+        radiance.reshape(size, size, 3), (LENS_BLUR, LENS_BLUR, 0), mode="wrap"
+    )
+    return Pelt(blurred, depth.reshape(size, size))
+
+
+def traced(
+    fur: PrismScene,
+    rays: Callable[[np.ndarray, FloatArray], tuple[FloatArray, FloatArray]],
+    count: int,
+    samples: int,
+    source: Source,
+    rng: np.random.Generator,
+    *,
+    bounces: int = BOUNCES,
+    progress: Callable[[float], None] | None = None,
+) -> FloatArray:
+    """Radiance (count, 3) that comes along a camera's rays, mean over each pixel.
+
+    rays: origins and directions (n, 3) of some pixels (n,) at places (2, n) in [0, 1)^2 of each.
+    samples: paths a pixel. progress: called with the fraction done in (0, 1], rising.
+    """
     numbers = 2 + NUMBERS_PER_VERTEX * (bounces + 1)  # the first two: a place in the pixel
     sobol = qmc.Sobol(numbers, seed=rng).random_base2(math.ceil(math.log2(samples)))
     indirect_samples = math.ceil(samples / INDIRECT_STRIDE)
     indirect_weight = samples / indirect_samples
     vertices = [bounces + 1 if k < indirect_samples else 1 for k in range(samples)]
 
-    radiance = np.zeros((size * size, 3), np.float32)
-    depth = np.empty(size * size, np.float32)
-    for first in range(0, size * size, PIXELS_PER_BLOCK):
-        pixels = np.arange(first, min(first + PIXELS_PER_BLOCK, size * size))
-        depth[pixels] = _depth(fur, pixels, size)
+    radiance = np.zeros((count, 3), np.float32)
+    for pixels in _blocks(count):
         shift = rng.random((numbers, len(pixels)), dtype=np.float32)
         for k in range(samples):
             random = (shift + sobol[k, :, None].astype(np.float32)) % np.float32(1)
-            origins = _camera_origins(pixels, size, random[:2], fur.top)
             radiance[pixels] += _path_radiance(
-                fur, origins, random[2:], vertices[k], indirect_weight, float(source_exponent)
+                fur, rays(pixels, random[:2]), random[2:], vertices[k], indirect_weight, source
             )
             if progress is not None:
-                done = first * sum(vertices) + len(pixels) * sum(vertices[: k + 1])
-                progress(done / (size * size * sum(vertices)))
-    picture = (radiance / np.float32(samples)).reshape(size, size, 3)
-    blurred = gaussian_filter(picture, (LENS_BLUR, LENS_BLUR, 0), mode="wrap")
-    return Pelt(blurred, depth.reshape(size, size))
+                done = pixels[0] * sum(vertices) + len(pixels) * sum(vertices[: k + 1])
+                progress(done / (count * sum(vertices)))
+    return radiance / np.float32(samples)
+
+
+def _blocks(count: int) -> list[np.ndarray]:
+    """Numbers of pixels that are traced at once."""
+    firsts = range(0, count, PIXELS_PER_BLOCK)
+    return [np.arange(first, min(first + PIXELS_PER_BLOCK, count)) for first in firsts]
 
 
 def _camera_origins(
@@ -193,31 +241,31 @@ def _depth(fur: PrismScene, pixels: np.ndarray, size: int) -> np.ndarray:
     distance = first_hits(fur.scene, origins, (0.0, 0.0, -1.0)).distance
     height: np.ndarray = _camera_height(fur.top) - distance.astype(np.float64)
     height[distance >= origins[:, 2]] = 0  # the skin exactly, whatever the rounding
-    return (1 - height / max(fur.top, 1e-12)).clip(0, 1)
+    return (1 - height / max(fur.top, 1e-12)).clip(0, 1).astype(np.float32)
 
 
 def _path_radiance(
     fur: PrismScene,
-    origins: FloatArray,
+    rays: tuple[FloatArray, FloatArray],
     random: FloatArray,
     vertices: int,
     indirect_weight: float,
-    source_exponent: float,
+    source: Source,
 ) -> FloatArray:
-    """Estimate what comes up to the camera along paths of ``vertices`` scatterings: (N, 3).
+    """Estimate what comes to the camera along paths of ``vertices`` scatterings: (N, 3).
 
     random: (NUMBERS_PER_VERTEX * vertices or more, N), in [0, 1).
     indirect_weight: of all light after the first scattering.
     """
+    origins, directions = rays
     count = len(origins)
-    directions = np.repeat(np.array([[0, 0, -1]], np.float32), count, axis=0)
     radiance = np.zeros((count, 3), np.float32)
     throughput = np.ones((count, 3), np.float32)
     for vertex in range(vertices):
         hits = first_hits(fur.scene, origins, directions)
         out = Scattered(*(np.empty((count, 3), np.float32) for _ in Scattered._fields))
         numbers = random[NUMBERS_PER_VERTEX * vertex :][:NUMBERS_PER_VERTEX]
-        scatter(hits, origins, directions, numbers, source_exponent, fur.fibres, out)
+        scatter(hits, origins, directions, numbers, source, fur.fibres, out)
         lit = ~occluded(fur.scene, out.light_origin, out.light_direction)
         radiance += throughput * out.light_weight * lit[:, None]
         throughput *= out.next_weight

@@ -1,4 +1,7 @@
-"""Hairs as triangular prisms among their periodic copies: what rays meet, and what shading asks."""
+"""Hairs as triangular prisms: what rays meet, and what shading asks.
+
+Those of a tile among their periodic copies, or hairs that stand as they are on any skin.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.rays import build_scene
 from pipelines.virtual.pelt.hairs import FloatArray, Hairs
 
@@ -17,9 +21,9 @@ SIDES = 3  # of a hair's prism
 
 
 class PrismScene(NamedTuple):
-    """Hairs of one tile with the copies around it that its rays can meet, ready for casting.
+    """Hairs, of one tile with the copies around it that its rays can meet or any, for casting.
 
-    scene: prisms of the hairs, and the skin below. top: height of the highest hair.
+    scene: prisms of the hairs, and the skin below. top: largest z of a hair.
     """
 
     scene: RaycastingScene
@@ -31,7 +35,7 @@ class Fibres(NamedTuple):
     """What shading needs to know of a triangle: arrays only, for numba.
 
     Triangle t < C * S belongs to copy t // S and there to row t % S of the prism's S triangles;
-    higher numbers are the skin.
+    higher numbers are the skin's triangles.
     """
 
     points: FloatArray  # (H, P, 3)
@@ -42,28 +46,57 @@ class Fibres(NamedTuple):
     copy_shift: FloatArray  # (C, 3)
     segment: np.ndarray  # (S,) the segment between points i and i + 1
     towards_tip: FloatArray  # (S, 3) 1 for the triangle's corners at point i + 1, else 0
+    skin_normals: FloatArray  # (F, 3) unit, of the skin's triangles
+    wraps: bool  # whether rays go on from inside the tile
 
 
 def build_prism_scene(hairs: Hairs, skin_albedo: tuple[float, float, float]) -> PrismScene:
-    """The prisms of hairs, of which there may be none, over a skin of this albedo (linear RGB)."""
+    """The prisms of a tile's hairs, of which there may be none, over a skin of this albedo (linear
+    RGB)."""
+    points = hairs.points.astype(np.float64)
+    # Every ray starts inside the tile, so the copies need to reach as far as a single ray flies
+    # through the fur. Margins of 2 and 4 times the height change the mean by 0.02 % (seen).
+    margin = float((points[..., 2] + hairs.radii).max(initial=0.0))
+    skin = 1e3 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+    plane = skin, np.array([(0, 1, 2), (0, 2, 3)])
+    return _scene(hairs, _copies_in_reach(points, margin), plane, skin_albedo, wraps=True)
+
+
+def build_coat_scene(
+    hairs: Hairs, skin: Mesh, skin_albedo: tuple[float, float, float]
+) -> PrismScene:
+    """The prisms of hairs as they stand on a skin: without copies."""
+    alone = np.arange(len(hairs.points)), np.zeros((len(hairs.points), 3))
+    mesh = skin.vertices, skin.triangles
+    return _scene(hairs, alone, mesh, skin_albedo, wraps=False)
+
+
+def _scene(
+    hairs: Hairs,
+    copies: tuple[np.ndarray, np.ndarray],
+    skin: tuple[np.ndarray, np.ndarray],
+    skin_albedo: tuple[float, float, float],
+    *,
+    wraps: bool,
+) -> PrismScene:
     points = hairs.points.astype(np.float64)
     count = points.shape[1]
     tangents = np.gradient(points, axis=1) if len(points) else points
     tangents /= np.maximum(np.linalg.norm(tangents, axis=-1, keepdims=True), 1e-12)
     rings = _rings(points, hairs.radii, tangents)
     top = float(rings[..., 2].max(initial=0.0))
-    # Every ray starts inside the tile, so the copies need to reach as far as a single ray flies
-    # through the fur. Margins of 2 and 4 times the height change the mean by 0.02 % (seen).
-    hair, copy_shift = _copies_in_reach(points, margin=top)
+    hair, copy_shift = copies
     template = _prism_triangles(count)
     prisms = np.arange(len(hair))[:, None, None] * (count * SIDES) + template
-    skin = 1e3 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
     vertices = (rings[hair] + copy_shift[:, None, None]).reshape(-1, 3)
-    triangles = prisms.reshape(-1, 3)
+    skin_corners, skin_triangles = skin
     scene = build_scene(
-        np.concatenate([vertices, skin]),
-        np.concatenate([triangles, len(vertices) + np.array([(0, 1, 2), (0, 2, 3)])]),
+        np.concatenate([vertices, skin_corners]),
+        np.concatenate([prisms.reshape(-1, 3), len(vertices) + skin_triangles]),
     )
+    a, b, c = skin_corners[skin_triangles].swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
     segment = template.min(axis=1) // SIDES
     fibres = Fibres(
         np.ascontiguousarray(hairs.points, np.float32),
@@ -74,6 +107,8 @@ def build_prism_scene(hairs: Hairs, skin_albedo: tuple[float, float, float]) -> 
         np.ascontiguousarray(copy_shift, np.float32),
         segment,
         (template // SIDES - segment[:, None]).astype(np.float32),
+        normals.astype(np.float32),
+        wraps,
     )
     return PrismScene(scene, top, fibres)
 

@@ -1,7 +1,7 @@
 """Scattering by hairs and skin, one path vertex at a time: compiled.
 
 The model is in the docstring of ``pelt``: Kajiya and Kay's fibre with Goldman's directionality,
-a Lambertian skin, a source overhead.
+a Lambertian skin, a source about a direction.
 """
 
 from __future__ import annotations
@@ -18,9 +18,19 @@ from pipelines.virtual.pelt.prisms import Fibres
 
 BACKSCATTER = 0.3
 NUMBERS_PER_VERTEX = 5  # random: direction to the light (2), next direction (3)
-SKIN_CLEARANCE = 1e-5  # rays start at least this far above the skin: no skin shadows itself
+SKIN_CLEARANCE = 1e-5  # rays start at least this far above the skin
 
 _Vector = tuple[float, float, float]
+
+
+class Source(NamedTuple):
+    """Light from afar: radiance (n + 2) / 2 cos^n about a direction, so that an open white
+    Lambertian surface that faces it has radiance 1."""
+
+    towards: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Unit vector to its middle."""
+    exponent: float = 2.0
+    """n: 0 is an even half of the sky, large a point."""
 
 
 class Scattered(NamedTuple):
@@ -79,42 +89,73 @@ def scatter(
     origins: FloatArray,
     directions: FloatArray,
     random: FloatArray,
-    exponent: float,
+    source: Source,
     fibres: Fibres,
     out: Scattered,
 ) -> None:
     """Fill ``out`` for each ray's first hit; random numbers (NUMBERS_PER_VERTEX, N) in [0, 1).
 
-    origins, directions: (N, 3) of the rays. exponent: n of the source, radiance
-    (n + 2) / 2 cos^n.
+    origins, directions: (N, 3) of the rays.
     """
     hair_triangles = len(fibres.segment) * len(fibres.hair)
+    exponent = source.exponent
     source_weight = math.pi * (exponent + 2) / (exponent + 1)  # radiance over density
     for i in range(len(hits.triangle)):
-        light = _source_direction(random[0, i], random[1, i], exponent)
+        light = _source_direction(random[0, i], random[1, i], source)
         disc = _disc_point(random[2, i], random[3, i])
         if hits.triangle[i] < 0:
             vertex = _at_the_source()
         elif hits.triangle[i] >= hair_triangles:
-            distance = hits.distance[i]
-            # To double precision afterwards: all kinds of vertices are of one type.
-            x = np.float64(origins[i, 0] + distance * directions[i, 0])
-            y = np.float64(origins[i, 1] + distance * directions[i, 1])
-            skin = len(fibres.albedo) - 1
-            vertex = _on_the_skin(x, y, skin, source_weight * light[2], disc)
+            normal = fibres.skin_normals[hits.triangle[i] - hair_triangles]
+            vertex = _on_the_skin(
+                _point_of(hits, origins, directions, i),
+                (np.float64(normal[0]), np.float64(normal[1]), np.float64(normal[2])),
+                len(fibres.albedo) - 1,
+                source_weight,
+                light,
+                disc,
+            )
         else:
             view = (-directions[i, 0], -directions[i, 1], -directions[i, 2])
             point = _fibre_point(fibres, hits, i)
             vertex = _on_a_fibre(point, view, light, source_weight, disc, random[4, i])
-        _send_on(vertex, light, fibres.albedo, out, i)
+        _send_on(vertex, light, fibres, out, i)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _source_direction(u: float, v: float, exponent: float) -> _Vector:
+def _source_direction(u: float, v: float, source: Source) -> _Vector:
     """Draw a direction to the source with density (n + 1) / (2 pi) cos^n."""
-    z = u ** (1 / (exponent + 1))
+    z = u ** (1 / (source.exponent + 1))
     r = math.sqrt(max(0.0, 1 - z * z))
-    return r * math.cos(2 * math.pi * v), r * math.sin(2 * math.pi * v), z
+    return _beside(source.towards, r * math.cos(2 * math.pi * v), r * math.sin(2 * math.pi * v), z)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _beside(axis: _Vector, a: float, b: float, c: float) -> _Vector:
+    """a and b along two unit vectors across a unit axis, and c along it.
+
+    Duff et al., "Building an Orthonormal Basis, Revisited" (2017); of z these are x and y.
+    """
+    x, y, z = axis
+    sign = math.copysign(1.0, z)
+    turn = -1.0 / (sign + z)
+    cross = x * y * turn
+    return (
+        a * (1.0 + sign * x * x * turn) + b * cross + c * x,
+        a * sign * cross + b * (sign + y * y * turn) + c * y,
+        -a * sign * x - b * y + c * z,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _point_of(hits: FirstHits, origins: FloatArray, directions: FloatArray, i: int) -> _Vector:
+    """Where ray i hits; in double precision afterwards: all kinds of vertices are of one type."""
+    distance = hits.distance[i]
+    return (
+        np.float64(origins[i, 0] + distance * directions[i, 0]),
+        np.float64(origins[i, 1] + distance * directions[i, 1]),
+        np.float64(origins[i, 2] + distance * directions[i, 2]),
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -131,11 +172,26 @@ def _at_the_source() -> _Vertex:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _on_the_skin(x: float, y: float, row: int, source: float, disc: _DiscPoint) -> _Vertex:
-    """Lambertian; ``source``: weight of the light times its cosine."""
+def _on_the_skin(
+    place: _Vector,
+    normal: _Vector,
+    row: int,
+    source_weight: float,
+    light: _Vector,
+    disc: _DiscPoint,
+) -> _Vertex:
+    """Lambertian. Rays leave from just above: no skin shadows itself."""
     a, b = disc.x, disc.y
     up = math.sqrt(max(0.0, 1 - a * a - b * b))
-    return _Vertex((x, y, 0.0), (a, b, up), 0.0, 0.0, source / math.pi, 1.0, row)
+    cosine = max(0.0, light[0] * normal[0] + light[1] * normal[1] + light[2] * normal[2])
+    onward = _beside(normal, a, b, up)
+    px, py, pz = place
+    above = (
+        px + SKIN_CLEARANCE * normal[0],
+        py + SKIN_CLEARANCE * normal[1],
+        pz + SKIN_CLEARANCE * normal[2],
+    )
+    return _Vertex(above, onward, 0.0, 0.0, source_weight * cosine / math.pi, 1.0, row)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -201,24 +257,28 @@ def _on_a_fibre(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _send_on(vertex: _Vertex, light: _Vector, albedo: FloatArray, out: Scattered, i: int) -> None:
-    """Write row i. Both rays go on from inside the tile, around which there are copies."""
-    px, py, pz = vertex.place
-    x, y = px + vertex.light_start * light[0], py + vertex.light_start * light[1]
-    out.light_origin[i, 0] = x - math.floor(x)
-    out.light_origin[i, 1] = y - math.floor(y)
-    out.light_origin[i, 2] = max(pz + vertex.light_start * light[2], SKIN_CLEARANCE)
-    nx, ny, nz = vertex.onward
-    x, y = px + vertex.next_start * nx, py + vertex.next_start * ny
-    out.next_origin[i, 0] = x - math.floor(x)
-    out.next_origin[i, 1] = y - math.floor(y)
-    out.next_origin[i, 2] = max(pz + vertex.next_start * nz, SKIN_CLEARANCE)
+def _send_on(vertex: _Vertex, light: _Vector, fibres: Fibres, out: Scattered, i: int) -> None:
+    """Write row i."""
+    albedo = fibres.albedo
+    _start(out.light_origin[i], vertex.place, vertex.light_start, light, fibres.wraps)
+    _start(out.next_origin[i], vertex.place, vertex.next_start, vertex.onward, fibres.wraps)
     for axis in range(3):
         out.light_direction[i, axis] = light[axis]
         out.next_direction[i, axis] = vertex.onward[axis]
     for channel in range(3):
         out.light_weight[i, channel] = vertex.light * albedo[vertex.albedo, channel]
         out.next_weight[i, channel] = vertex.goes_on * albedo[vertex.albedo, channel]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _start(row: FloatArray, place: _Vector, distance: float, way: _Vector, wraps: bool) -> None:
+    """Where a ray begins: inside the tile, around which there are copies, where fur ``wraps``."""
+    x, y = place[0] + distance * way[0], place[1] + distance * way[1]
+    z = place[2] + distance * way[2]
+    if wraps:
+        row[0], row[1], row[2] = x - math.floor(x), y - math.floor(y), max(z, SKIN_CLEARANCE)
+    else:
+        row[0], row[1], row[2] = x, y, z
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
