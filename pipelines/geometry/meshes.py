@@ -64,6 +64,16 @@ def check_mesh(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) ->
         )
 
 
+def joined_vertices(
+    vertices: NDArray[np.floating], normals: NDArray[np.floating]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices (V, 3) without copies: the row of each position's first copy (P,), and which
+    position each vertex (V,) has. Those of other normals are apart: sheets back to back are two."""
+    both = np.concatenate([vertices, normals], axis=1) + 0.0  # + 0.0: no -0.0
+    _, first, position = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    return first.astype(np.int64), position.reshape(-1).astype(np.int64)
+
+
 def grid_triangles(rows: int, columns: int) -> NDArray[np.int64]:
     """Triangles (F, 3) of a grid's positions, numbered row by row; two to each of its cells."""
     numbers = np.arange(rows * columns).reshape(rows, columns)

@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.geometry.mesh_edges import edge_vertices
+from pipelines.geometry.meshes import joined_vertices
 
 SLOTS = 3
 """Patches at a place."""
@@ -67,20 +68,25 @@ def lay_patches(
 ) -> Laying:
     """Cover a mesh with patches of a photograph.
 
-    points, normals, tangents (V, 3): positions without copies, the lie of the hair along them.
-    triangles (F, 3). spacing: distance of neighbouring patches' middles; width: of the photograph
-    as it lies on the surface; both in mesh units. Raises ValueError where they are not positive.
+    points, normals, tangents (V, 3): tangents are the lie of the hair; copies of a vertex count as
+    one. triangles (F, 3). spacing: distance of neighbouring patches' middles; width: of the
+    photograph as it lies on the surface; both in mesh units. Raises ValueError where they are not
+    positive.
     """
     for name, value in (("spacing", spacing), ("width", width)):
         if not value > 0:
             raise ValueError(f"{name} is {value:g}; expected a positive length.")
     random = np.random.default_rng(seed)
-    around = _Neighbours.of(points, triangles, tangents, normals)
+    first, position = joined_vertices(points, normals)
+    corners = position[triangles]
+    apart = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    around = _Neighbours.of(points[first], apart, tangents[first], normals[first])
     middles = _spread_out(around, spacing)
-    distance, place = _charts(around, middles, REACH * spacing)
-    where = _places(middles, distance, piece, random)
-    weights = _weights(distance, REACH * spacing)
-    return _split(triangles.astype(np.int64), weights, place / width, where, piece, middles)
+    charts = _charts(around, middles, REACH * spacing)
+    where = _places(middles, charts, piece, random)
+    shown = _shown(corners, charts)
+    vertex, split, uvs, weights = _split(corners, shown, charts, where, piece, width)
+    return Laying(first[vertex], split, uvs, weights, shown, first[middles])
 
 
 # ---- the surface -----------------------------------------------------------------------------
@@ -151,22 +157,64 @@ def _distances(around: _Neighbours, start: int, farthest: float) -> NDArray[np.f
     return found
 
 
-def _charts(
-    around: _Neighbours, middles: NDArray[np.int64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distance (P, V) of each vertex from each middle in its chart, inf beyond the radius, and the
-    place (P, V, 2) there: lengths along and across the lie."""
+class _Charts(NamedTuple):
+    """What each patch covers, row by row, sorted by vertex and patch."""
+
+    vertex: NDArray[np.int64]
+    patch: NDArray[np.int64]
+    place: NDArray[np.float64]
+    """(M, 2): lengths along and across the lie from the patch's middle."""
+    weight: NDArray[np.float64]
+    """At most ``SLOTS`` at a vertex are above 0."""
+    patches: int
+
+    def rows(
+        self, vertex: NDArray[np.int64], patch: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The row of each pair, and whether there is one."""
+        keys = self.vertex * self.patches + self.patch
+        wanted = vertex * self.patches + patch
+        row = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return row, (keys[row] == wanted) & (patch >= 0)
+
+
+def _charts(around: _Neighbours, middles: NDArray[np.int64], radius: float) -> _Charts:
+    """Charts of all vertices within 1.5 radii of each middle along the surface."""
     count = len(around.first) - 1
-    place = np.zeros((len(middles), count, 2))
+    parts = []
     for number, middle in enumerate(middles):
         far = _distances(around, middle, 1.5 * radius)
         (inside,) = np.nonzero(np.isfinite(far))
         order = inside[np.argsort(far[inside], kind="stable")]
-        _follow(order, far, around.first, around.to, around.length, around.step, place[number])
-        place[number, ~np.isfinite(far)] = np.inf
-    distance = np.hypot(place[..., 0], place[..., 1])
-    distance[distance > radius] = np.inf
-    return distance, place
+        place = np.zeros((count, 2))
+        _follow(order, far, around.first, around.to, around.length, around.step, place)
+        parts.append((inside, np.full(len(inside), number), place[inside]))
+    vertex, patch, place = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.lexsort((patch, vertex))
+    vertex, patch, place = vertex[order], patch[order], place[order]
+    weight = _weights(vertex, np.hypot(*place.T) / radius, count)
+    return _Charts(vertex, patch, place, weight, len(middles))
+
+
+def _weights(
+    vertex: NDArray[np.int64], distance: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Fading from 1 in a patch's middle to 0 at its rim, distance 1, but for all beside the nearest
+    ``SLOTS`` at a vertex; adding up to 1 at each."""
+    fading = np.maximum(1.0 - distance, 0.0) ** _SHARPNESS
+    order = np.lexsort((distance, vertex))
+    first = np.searchsorted(vertex, np.arange(count))
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order)) - first[vertex[order]]
+    # Less the first that has no slot: no weight jumps where the order changes.
+    without = np.zeros(count)
+    without[vertex[rank == SLOTS]] = fading[rank == SLOTS]
+    fading = np.maximum(fading - without[vertex], 0.0)
+    total = np.bincount(vertex, fading, count)
+    alone = total[vertex] <= 1e-12
+    fading = np.where(alone, (rank == 0).astype(np.float64), fading)
+    weights: NDArray[np.float64] = fading / np.where(alone, 1.0, total[vertex])
+    return weights
 
 
 @njit(cache=True, nogil=True)
@@ -198,79 +246,77 @@ def _follow(
 
 def _places(
     middles: NDArray[np.int64],
-    distance: NDArray[np.float64],
+    charts: _Charts,
     piece: Piece,
     random: np.random.Generator,
 ) -> NDArray[np.int64]:
-    """Which piece (P,) each patch takes: of some, that farthest from its neighbours' and least
-    used: what is near looks different."""
+    """Which piece (P,) each patch takes: of some, that farthest from its neighbours'."""
+    number = np.full(int(charts.vertex.max()) + 1, -1)
+    number[middles] = np.arange(len(middles))
+    beside = number[charts.vertex]
+    one, other = charts.patch[beside >= 0], beside[beside >= 0]
     chosen = np.full(len(middles), -1)
-    near = np.isfinite(distance[:, middles])
     for patch in range(len(middles)):
         candidates = random.integers(0, len(piece.places), _CANDIDATES)
-        others = chosen[(near[patch] | near[:, patch]) & (chosen >= 0)]
-        if len(others) == 0:
+        near = np.concatenate([other[one == patch], one[other == patch]])
+        taken = chosen[near][chosen[near] >= 0]
+        if len(taken) == 0:
             chosen[patch] = candidates[0]
             continue
-        apart = piece.places[candidates][:, None] - piece.places[others][None]
+        apart = piece.places[candidates][:, None] - piece.places[taken][None]
         chosen[patch] = candidates[np.argmax(np.linalg.norm(apart, axis=-1).min(axis=1))]
     return chosen
 
 
-def _weights(distance: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """(P, V): fading from 1 in a patch's middle to 0 at its rim, but for all beside the nearest
-    ``SLOTS`` at a vertex; adding up to 1."""
-    nearness = np.where(np.isfinite(distance), 1.0 - distance / radius, 0.0)
-    fading = nearness**_SHARPNESS
-    if len(fading) > SLOTS:
-        # Less the first that has no slot: no weight jumps where the order changes.
-        fading = np.maximum(fading - np.sort(fading, axis=0)[-SLOTS - 1], 0.0)
-    total = fading.sum(axis=0)
-    nearest = np.argmin(distance, axis=0)
-    alone = total <= 1e-9
-    fading[:, alone] = 0.0
-    fading[nearest[alone], np.flatnonzero(alone)] = 1.0
-    weights: NDArray[np.float64] = fading / np.where(alone, 1.0, total)
-    return weights
+def _shown(triangles: NDArray[np.int64], charts: _Charts) -> NDArray[np.int64]:
+    """The patches (F, SLOTS) that weigh most on a triangle's corners, ascending; -1 for none."""
+    (heavy,) = np.nonzero(charts.weight > 0)
+    vertex = charts.vertex[heavy]
+    slot = np.arange(len(heavy)) - np.searchsorted(vertex, vertex)
+    patch = np.full((int(triangles.max()) + 1, SLOTS), -1)
+    weight = np.zeros(patch.shape)
+    patch[vertex, slot], weight[vertex, slot] = charts.patch[heavy], charts.weight[heavy]
+    candidates, weights = patch[triangles].reshape(-1, 3 * SLOTS), weight[triangles]
+    weights = weights.reshape(candidates.shape)
+    same = candidates[:, :, None] == candidates[:, None, :]
+    total = np.einsum("fij,fj->fi", same, weights)
+    is_first = ~(same & np.tri(3 * SLOTS, k=-1, dtype=bool)).any(axis=2) & (candidates >= 0)
+    total = np.where(is_first, total, -1.0)
+    best = np.argsort(-total, axis=1, kind="stable")[:, :SLOTS]
+    found = np.where(
+        np.take_along_axis(total, best, axis=1) > 0,
+        np.take_along_axis(candidates, best, axis=1),
+        -1,
+    )
+    ordered: NDArray[np.int64] = np.sort(np.where(found < 0, charts.patches, found), axis=1)
+    return np.where(ordered == charts.patches, -1, ordered)
 
 
 def _split(
     triangles: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    place: NDArray[np.float64],
+    shown: NDArray[np.int64],
+    charts: _Charts,
     where: NDArray[np.int64],
     piece: Piece,
-    middles: NDArray[np.int64],
-) -> Laying:
-    """Vertices with the coordinates of their triangle's patches; shared where these are the same.
-
-    A triangle shows the patches that weigh most on its corners.
-    """
-    of_triangle = weights[:, triangles].sum(axis=2)
-    slots = min(SLOTS, len(weights))
-    shown = np.sort(np.argsort(-of_triangle, axis=0, kind="stable")[:slots].T, axis=1)
-    shown = np.pad(shown, ((0, 0), (0, SLOTS - slots)), constant_values=-1)
-    is_shown = (shown >= 0) & (np.take_along_axis(of_triangle.T, shown, axis=1) > 0)
-    shown = np.where(is_shown, shown, -1)
+    width: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
+    """Vertices with the coordinates of their triangle's patches, shared where these are the same:
+    vertex, triangles, coordinates and weights as of `Laying`."""
     corners = np.concatenate([triangles.reshape(-1, 1), np.repeat(shown, 3, axis=0)], axis=1)
     found, number = np.unique(corners, axis=0, return_inverse=True)
     vertex, patch = found[:, 0], found[:, 1:]
-    there = np.maximum(patch, 0)
-    share = np.where(patch >= 0, weights[there, vertex[:, None]], 0.0)
+    row, is_there = charts.rows(np.repeat(vertex[:, None], SLOTS, axis=1), patch)
+    share = np.where(is_there, charts.weight[row], 0.0)
     total = share.sum(axis=1, keepdims=True)
-    at = place[there, vertex[:, None]]
-    at = np.where((patch >= 0)[..., None] & np.isfinite(at), at, 0.0)
-    angle = piece.directions[where[there]]
+    at = np.where(is_there[..., None], charts.place[row], 0.0) / width
+    angle = piece.directions[where[patch]]
     cosine, sine = np.cos(angle), np.sin(angle)
     turned = np.stack(
         [cosine * at[..., 0] - sine * at[..., 1], sine * at[..., 0] + cosine * at[..., 1]], axis=-1
     )
-    uvs = piece.places[where[there]] + turned
-    return Laying(
+    return (
         vertex,
         number.reshape(-1, 3).astype(np.int32),
-        uvs.astype(np.float32),
+        (piece.places[where[patch]] + turned).astype(np.float32),
         (share / np.where(total > 0, total, 1.0)).astype(np.float32),
-        shown,
-        middles,
     )

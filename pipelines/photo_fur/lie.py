@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.geometry.mesh_edges import edge_vertices
+from pipelines.geometry.meshes import joined_vertices
 
 Complex = NDArray[np.complex128]
 
@@ -67,7 +68,7 @@ def lie_field(
     """
     if not smoothness > 0:
         raise ValueError(f"smoothness is {smoothness:g}; expected a positive length.")
-    first, position = _positions(vertices, normals)
+    first, position = joined_vertices(vertices, normals)
     frames = _frames(normals[first])
     wanted = _in_planes(guides, position, frames)
     longest = np.abs(wanted).max(initial=0.0)
@@ -129,16 +130,6 @@ def guides_along(
 
 
 # ---- planes ----------------------------------------------------------------------------------
-
-
-def _positions(
-    vertices: NDArray[np.floating], normals: NDArray[np.floating]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The first of each vertex's copies (P,), and which position each vertex (V,) has; sheets that
-    meet back to back are apart."""
-    both = np.concatenate([vertices, normals], axis=1) + 0.0
-    _, first, position = np.unique(both, axis=0, return_index=True, return_inverse=True)
-    return first, position.reshape(-1)
 
 
 def _frames(normals: NDArray[np.floating]) -> NDArray[np.float64]:
