@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.drawing.colour import luminance
 from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
+from pipelines.photo_fur.laid_fur import LaidFur
+from pipelines.photo_fur.laying import Laying
+from pipelines.photo_fur.lie import LieField
 from pipelines.photo_fur.photograph import FurPhotograph
+from pipelines.photo_fur.photograph_lie import PhotographLie
 from pipelines.photo_fur.shells import ShellMesh
 from storage.stored_version import StoredVersion
 
@@ -133,6 +137,64 @@ def shell_mesh_of(dataset: xr.Dataset) -> ShellMesh:
     )
 
 
+def lie_field_dataset(
+    field: LieField, guides: NDArray[np.floating], backwards: NDArray[np.floating], name: str
+) -> xr.Dataset:
+    """`lie_field` of a mesh."""
+    import numpy as np
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "tangents": (("vertex", "axis"), field.tangents.astype(np.float32)),
+            "guides": (("vertex", "axis"), guides.astype(np.float32)),
+            "singular_triangle": ("singularity", field.singular_triangles),
+            "index": ("singularity", field.indices),
+            "backwards": ("axis", backwards),
+        },
+        attrs={"name": name},
+    )
+
+
+def fur_patches_dataset(laying: Laying, lie: PhotographLie, width: float) -> xr.Dataset:
+    """`fur_patches` of a photograph on a mesh, as wide as ``width`` there."""
+    import numpy as np
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            "vertex": ("corner_vertex", laying.vertex),
+            "triangles": (("triangle", "corner"), laying.triangles),
+            "uvs": (("corner_vertex", "slot", "uv"), laying.uvs),
+            "weights": (("corner_vertex", "slot"), laying.weights),
+            "patches": (("triangle", "slot"), laying.patches),
+            "middles": ("patch", laying.middles),
+            "direction": (_PIXELS, lie.direction.astype(np.float32)),
+            "coherence": (_PIXELS, lie.coherence.astype(np.float32)),
+            "slant": ((), lie.slant),
+            "width": ((), width),
+        }
+    )
+
+
+def laying_of(fur_patches: xr.Dataset) -> Laying:
+    """The patches that a `fur_patches` dataset holds."""
+    return Laying(*(fur_patches[name].values for name in Laying._fields))
+
+
+def laid_fur_of(shell_mesh: xr.Dataset, lie_field: xr.Dataset, fur_patches: xr.Dataset) -> LaidFur:
+    """The fur laid over the mesh, as it is drawn."""
+    mesh, laying = shell_mesh_of(shell_mesh), laying_of(fur_patches)
+    return LaidFur(
+        mesh.vertices[-1][laying.vertex],
+        mesh.normals[laying.vertex],
+        lie_field["tangents"].values[laying.vertex],
+        laying,
+        mesh.thickness,
+        mesh.layers,
+    )
+
+
 def frames_dataset(frames: Frames, views: Sequence[View]) -> xr.Dataset:
     """`fur_frames` of the pictures from these views."""
     import xarray as xr
@@ -151,5 +213,8 @@ LOADERS: dict[str, Callable[[StoredVersion], object]] = {
     "attenuation": lambda version: photograph_of(version.input("fur_photo"), version.dataset),
     "shell_stack": lambda version: shell_stack_of(version.dataset),
     "shell_mesh": lambda version: shell_mesh_of(version.dataset),
+    "lie_field": lambda version: version.dataset["tangents"].values,
+    "fur_patches": lambda version: laying_of(version.dataset),
 }
-"""What ``tsuya.load`` gives, by asset: the photograph with its medium, its layers, the mesh."""
+"""What ``tsuya.load`` gives, by asset: the photograph with its medium, its layers, the mesh, how
+hair lies there (vertex, 3), and the photograph laid along it."""

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.photo_fur.datasets import frames_dataset, opaque_of, photograph_of, shell_mesh_of
+from assets_defs.photo_fur.datasets import (
+    frames_dataset,
+    laid_fur_of,
+    opaque_of,
+    photograph_of,
+    shell_mesh_of,
+)
 from assets_defs.photo_fur.declaration import FUR, SQUARE
 from assets_defs.settings import Preset, Settings
 from assets_defs.system import Pictures, Progress, Result
@@ -21,6 +27,11 @@ from storage.stored_version import StoredVersion
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipelines.photo_fur.frames import Frames, View
+    from pipelines.photo_fur.laid_fur import LaidFur
+    from pipelines.photo_fur.photograph import FurPhotograph
+    from pipelines.photo_fur.shells import ShellMesh
+
 
 class FrameSettings(Settings):
     """How the pictures are taken."""
@@ -32,9 +43,14 @@ class FrameSettings(Settings):
         description="Pixels across, 4:3; the square's pictures go by the photograph's size",
     )
     supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
+    look: Literal["full", "plain"] = Field(
+        "full",
+        description="Full: patches along the lie, light on hairs; plain: as in the paper. The "
+        "square is always plain",
+    )
     tails: Tails = "end layers"
     fill: Fill = Field(
-        "columns", description="Layers show whole hairs (columns) or, as in the paper, bands"
+        "columns", description="Plain: layers show whole hairs (columns) or, as in the paper, bands"
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
@@ -76,7 +92,7 @@ def _mean_brightness(version: StoredVersion) -> float:
     schemas.FUR_FRAMES,
     by=("photo", "mesh"),
     settings=FrameSettings,
-    inputs=("fur_photo", "attenuation", "shell_mesh"),
+    inputs=("fur_photo", "attenuation", "shell_mesh", "lie_field", "fur_patches"),
     kinds=frozenset({"zarr", "pyvista"}),
     pictures=_pictures,
     checks=(
@@ -111,14 +127,43 @@ def fur_frames(
     fur_photo: xr.Dataset,
     attenuation: xr.Dataset,
     shell_mesh: xr.Dataset,
+    lie_field: xr.Dataset,
+    fur_patches: xr.Dataset,
 ) -> Result:
     """Draw the fur on the mesh from every view."""
+    photograph = photograph_of(fur_photo, attenuation)
+    if settings.look == "full" and keys["mesh"] != SQUARE:
+        laid = laid_fur_of(shell_mesh, lie_field, fur_patches)
+        drawn, views = _laid(settings, photograph, laid, progress)
+    else:
+        mesh = shell_mesh_of(shell_mesh)
+        drawn, views = _plain(settings, photograph, mesh, keys["mesh"] == SQUARE, progress)
+    return frames_dataset(drawn, views), {"views": len(views)}
+
+
+def _laid(
+    settings: FrameSettings, photograph: FurPhotograph, fur: LaidFur, progress: Progress
+) -> tuple[Frames, Sequence[View]]:
+    from pipelines.photo_fur.frames import ROUND_VIEWS, draw_laid_frames
+
+    size = settings.width * 3 // 4, settings.width
+    drawn = draw_laid_frames(
+        photograph, fur, ROUND_VIEWS, size, settings.supersampling, settings.tails, progress
+    )
+    return drawn, ROUND_VIEWS
+
+
+def _plain(
+    settings: FrameSettings,
+    photograph: FurPhotograph,
+    mesh: ShellMesh,
+    is_square: bool,
+    progress: Progress,
+) -> tuple[Frames, Sequence[View]]:
     from pipelines.photo_fur import frames
 
-    photograph = photograph_of(fur_photo, attenuation)
-    mesh = shell_mesh_of(shell_mesh)
     views, size = frames.ROUND_VIEWS, (settings.width * 3 // 4, settings.width)
-    if keys["mesh"] == SQUARE:
+    if is_square:
         mesh = frames.stretched_to_photograph(mesh, photograph)
         views, size = frames.SQUARE_VIEWS, frames.top_view_size(photograph.luminance.shape)
     drawn = frames.draw_frames(
@@ -131,4 +176,4 @@ def fur_frames(
         fill=settings.fill,
         progress=progress,
     )
-    return frames_dataset(drawn, views), {"views": len(views)}
+    return drawn, views

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.photo_fur.attenuation import Attenuation, Tails
+from pipelines.photo_fur.laying import Laying
 
 
 def contrast(luminance: NDArray[np.floating]) -> float:
@@ -120,6 +123,87 @@ def top_view_rmse(
     if opaque is not None:
         step = step[opaque.repeat(times, axis=0).repeat(times, axis=1)]
     return float(np.sqrt(np.mean((step / 255.0) ** 2)))
+
+
+def guide_error(guides: NDArray[np.floating], tangents: NDArray[np.floating]) -> float:
+    """Median angle in degrees between guides (V, 3) and the hair's directions (V, 3), weighted by
+    the guides' lengths; 90 of hair that lies anyhow."""
+    length = np.linalg.norm(guides, axis=1)
+    cosine = np.einsum("vi,vi->v", guides, tangents) / np.maximum(length, 1e-12)
+    return weighted_median(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), length)
+
+
+def weighted_median(values: NDArray[np.floating], weights: NDArray[np.floating]) -> float:
+    """The value (n,) below which half of the weights (n,) lie."""
+    order = np.argsort(values)
+    summed = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(summed, summed[-1] / 2)])
+
+
+class LaidGradients(NamedTuple):
+    """How a photograph runs over the surface, by triangle and slot where the patch counts."""
+
+    triangle: NDArray[np.int64]
+    """(n,)."""
+    corner: NDArray[np.int64]
+    """(n,): a split vertex of it."""
+    place: NDArray[np.float64]
+    """(n, 2): in the photograph, widths from its lower left."""
+    gradient: NDArray[np.float64]
+    """(n, 2, 3): photograph widths a mesh unit."""
+    area: NDArray[np.float64]
+    """(n,): of the triangle, times the patch's weight."""
+
+
+def laid_gradients(skin: NDArray[np.floating], laying: Laying) -> LaidGradients:
+    """Gradients of a laying's coordinates over the skin (V, 3)."""
+    corners = skin[laying.vertex].astype(np.float64)[laying.triangles]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(one, two)
+    doubled = np.linalg.norm(normal, axis=1)
+    uvs = laying.uvs.astype(np.float64)[laying.triangles]
+    weight = laying.weights[laying.triangles]
+    counts = (weight > 0.2).all(axis=1) & (doubled > 1e-12 * doubled.max())[:, None]
+    triangle, slot = np.nonzero(counts)
+    frame = np.stack([one, two, normal], axis=1)[triangle]
+    uv = uvs[triangle, :, slot]
+    steps = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0], 0 * uv[:, 0]], axis=1)
+    gradient = np.linalg.solve(frame, steps).transpose(0, 2, 1).astype(np.float64)
+    area = doubled[triangle] / 2 * weight[triangle, :, slot].mean(axis=1)
+    return LaidGradients(
+        triangle, laying.triangles[triangle, 0].astype(np.int64), uv.mean(axis=1), gradient, area
+    )
+
+
+def strand_scale_spread(skin: NDArray[np.floating], laying: Laying) -> float:
+    """Width of hairs at the 90th over that at the 10th percentile of the surface: of the square
+    root of the area that the photograph takes."""
+    found = laid_gradients(skin, laying)
+    across = np.cross(found.gradient[:, 0], found.gradient[:, 1])
+    scale = np.sqrt(np.linalg.norm(across, axis=1))
+    order = np.argsort(scale)
+    summed = np.cumsum(found.area[order]) / found.area.sum()
+    low, high = (scale[order][np.searchsorted(summed, share)] for share in (0.1, 0.9))
+    return float(high / max(low, 1e-12))
+
+
+def laid_lie_error(
+    skin: NDArray[np.floating],
+    tangents: NDArray[np.floating],
+    laying: Laying,
+    direction: NDArray[np.floating],
+    coherence: NDArray[np.floating],
+) -> float:
+    """Median angle in degrees, over the surface, between the field's tangents (V, 3) and the laid
+    photograph's hair, whose direction and coherence (y, x) are as of `photograph_lie`."""
+    found = laid_gradients(skin, laying)
+    along = np.einsum("nuk,nk->nu", found.gradient, tangents[laying.vertex[found.corner]])
+    height, width = direction.shape
+    columns = np.clip((found.place[:, 0] * width).astype(int), 0, width - 1)
+    rows = np.clip(height - 1 - (found.place[:, 1] * width).astype(int), 0, height - 1)
+    apart = np.arctan2(along[:, 1], along[:, 0]) - direction[rows, columns]
+    degrees = np.degrees(np.abs(np.angle(np.exp(1j * apart))))
+    return weighted_median(degrees, found.area * coherence[rows, columns])
 
 
 def mean_brightness(pictures: NDArray[np.uint8], background: NDArray[np.uint8]) -> float:

@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, fitting_distance, orbit
 from pipelines.photo_fur.attenuation import Tails
+from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.shells import ShellMesh
-from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
+from pipelines.photo_fur.stage_view import Fill, FurLight, fur_surface, fur_texture
 
 BACKGROUND = (0.32, 0.34, 0.37)
 LEAST_SIDE = 384
 """Pictures of a smaller photograph show a texel in several pixels."""
 _VIEW_ANGLE = 30.0
 _MARGIN = 1.03
+_LAMP_BESIDE, _LAMP_ABOVE = 35.0, 40.0
+"""Degrees from the view, and above the horizon."""
 
 
 class View(NamedTuple):
@@ -88,6 +91,36 @@ def draw_frames(
                 )
             )
             stage.light(Light())
+            stage.look(camera)
+            picture = stage.radiance()
+        pictures.append(to_8bit(picture[..., :3]))
+        coverage.append(float(np.mean(picture[..., 3] > 0)))
+    return Frames(np.stack(pictures), np.array(coverage))
+
+
+def draw_laid_frames(
+    photograph: FurPhotograph,
+    fur: LaidFur,
+    views: Sequence[View],
+    size: tuple[int, int],
+    supersampling: int,
+    tails: Tails,
+    progress: Callable[[float], None],
+) -> Frames:
+    """Draw fur laid in patches from every view, each lit from its upper left and a little along it.
+
+    size: (height, width) of the pictures, pixels. Raises as ``draw_frames`` does.
+    """
+    image = fur_texture(photograph, fur.layers, tails=tails)
+    height, width = size
+    cameras = view_cameras(views, fur.reach, width / height)
+    pictures, coverage = [], []
+    for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
+        progress(done / len(views))
+        lamp = orbit((0.0, 0.0, 0.0), 1.0, view.azimuth - _LAMP_BESIDE, _LAMP_ABOVE).position
+        light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=lamp)
+        with Stage(width, height, background=BACKGROUND, supersampling=supersampling) as stage:
+            stage.add(laid_surface(fur, image, photograph.attenuation, light))
             stage.look(camera)
             picture = stage.radiance()
         pictures.append(to_8bit(picture[..., :3]))

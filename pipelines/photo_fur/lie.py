@@ -83,6 +83,19 @@ def lie_field(
     return LieField(directions[position], places, indices)
 
 
+def nose_to_tail(vertices: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Unit vector (3,) from the nose of a body to its tail, as most bodies have them: along the
+    longer side of its box on the ground, away from where it is higher."""
+    points = np.asarray(vertices, np.float64)
+    low, high = points.min(axis=0), points.max(axis=0)
+    axis = int(np.argmax((high - low)[:2] * (1.0, 1.0 - 1e-9)))
+    share = (points[:, axis] - low[axis]) / max(high[axis] - low[axis], 1e-30)
+    ahead, behind = points[share > 0.75, 2], points[share < 0.25, 2]
+    way = np.zeros(3)
+    way[axis] = -1.0 if ahead.max() > behind.max() + 1e-6 * (high[2] - low[2]) else 1.0
+    return way
+
+
 def guides_backwards(
     normals: NDArray[np.floating], backwards: NDArray[np.floating], gravity: float = 0.5
 ) -> NDArray[np.float64]:

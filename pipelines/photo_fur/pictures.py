@@ -41,6 +41,17 @@ def decay_picture(
     return canvas_picture(canvas)
 
 
+def lie_picture(
+    direction: NDArray[np.floating], coherence: NDArray[np.floating]
+) -> NDArray[np.uint8]:
+    """How hair lies in a photograph: the direction as a hue, paler where nothing has one."""
+    from matplotlib.colors import hsv_to_rgb
+
+    hue = np.mod(direction / (2 * np.pi), 1.0)
+    colours = hsv_to_rgb(np.stack([hue, np.clip(coherence, 0, 1), np.ones_like(hue)], axis=-1))
+    return (colours * 255).astype(np.uint8)
+
+
 def layer_picture(layer: NDArray[np.uint8], layers: int) -> NDArray[np.uint8]:
     """The layer of every pixel in colour: yellow at the tips, violet at the skin, red dropped."""
     from matplotlib import colormaps

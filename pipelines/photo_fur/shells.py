@@ -63,9 +63,14 @@ def make_shell_mesh(
 
 
 def usual_thickness(vertices: NDArray[np.floating]) -> float:
-    """USUAL_THICKNESS of the mesh's radius about the middle of its box, mesh units."""
+    """USUAL_THICKNESS of the mesh's radius, mesh units."""
+    return USUAL_THICKNESS * mesh_radius(vertices)
+
+
+def mesh_radius(vertices: NDArray[np.floating]) -> float:
+    """Of the sphere about the middle of a mesh's box that holds all vertices (V, 3)."""
     from_the_middle = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return USUAL_THICKNESS * float(np.linalg.norm(from_the_middle, axis=1).max())
+    return float(np.linalg.norm(from_the_middle, axis=1).max())
 
 
 def shell_heights(thickness: float, layers: int) -> NDArray[np.float64]:

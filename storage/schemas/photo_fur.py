@@ -106,6 +106,62 @@ SHELL_MESH = Schema(
     },
 )
 
+LIE_FIELD = Schema(
+    _SYSTEM,
+    "lie_field",
+    1,
+    "How hair lies on the mesh: a smooth field of directions (Knöppel et al. 2013).",
+    {
+        "tangents": Variable(
+            ("vertex", "axis"), "float32", "1", "Unit directions along the surface, to the tips"
+        ),
+        "guides": Variable(
+            ("vertex", "axis"), "float32", "1", "Wanted directions; longer ones count for more"
+        ),
+        "singular_triangle": Variable(
+            ("singularity",), "int64", "1", "Triangles about which the direction turns round"
+        ),
+        "index": Variable(
+            ("singularity",), "int64", "1", "How often it does: 1 for a crown, -1 for a saddle"
+        ),
+        "backwards": Variable(("axis",), "float64", "1", "Unit vector from nose to tail"),
+    },
+)
+
+FUR_PATCHES = Schema(
+    _SYSTEM,
+    "fur_patches",
+    1,
+    "The photograph laid over the mesh in patches that follow the lie (Praun et al. 2000).",
+    {
+        "vertex": Variable(
+            ("corner_vertex",), "int64", "1", "Vertex of the mesh; split where patches change"
+        ),
+        "triangles": Variable(("triangle", "corner"), "int32", "1", "Split vertices' numbers"),
+        "uvs": Variable(
+            ("corner_vertex", "slot", "uv"),
+            "float32",
+            "photograph",
+            "Places in the photograph, in widths, origin bottom left",
+        ),
+        "weights": Variable(
+            ("corner_vertex", "slot"), "float32", "1", "Of the patches, adding up to 1"
+        ),
+        "patches": Variable(
+            ("triangle", "slot"), "int64", "1", "Patches that a triangle shows; -1 for none"
+        ),
+        "middles": Variable(("patch",), "int64", "1", "Vertex in the middle of each patch"),
+        "direction": Variable(
+            _PIXELS, "float32", "radian", "How hair lies in the photograph, from x towards y (up)"
+        ),
+        "coherence": Variable(_PIXELS, "float32", "1", "1 where all lines are parallel"),
+        "slant": Variable(
+            (), "float64", "1", "Skewness of brightness's steps towards the tips; 0: sign unknown"
+        ),
+        "width": Variable((), "float64", "mesh unit", "Of the photograph on the surface"),
+    },
+)
+
 FUR_FRAMES = Schema(
     _SYSTEM,
     "fur_frames",
@@ -129,4 +185,13 @@ FUR_PACKAGE = Schema(
     {"file": Variable(("byte",), "uint8", "1", "Bytes of the `.tsuya` file")},
 )
 
-SCHEMAS = (FUR_PHOTO, ATTENUATION, SHELL_STACK, SHELL_MESH, FUR_FRAMES, FUR_PACKAGE)
+SCHEMAS = (
+    FUR_PHOTO,
+    ATTENUATION,
+    SHELL_STACK,
+    SHELL_MESH,
+    LIE_FIELD,
+    FUR_PATCHES,
+    FUR_FRAMES,
+    FUR_PACKAGE,
+)

@@ -70,7 +70,9 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "attenuation": {"fur_photo"},
         "shell_stack": {"fur_photo", "attenuation"},
         "shell_mesh": set(),
-        "fur_frames": {"fur_photo", "attenuation", "shell_mesh"},
+        "lie_field": {"shell_mesh"},
+        "fur_patches": {"fur_photo", "shell_mesh", "lie_field"},
+        "fur_frames": {"fur_photo", "attenuation", "shell_mesh", "lie_field", "fur_patches"},
         "fur_package": {"fur_photo", "attenuation", "shell_mesh"},
     }
     assert _parents(house, BTF) == {

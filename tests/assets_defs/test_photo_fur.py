@@ -17,11 +17,15 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur import (
     attenuation,
     frames,
+    laying,
+    lie,
     live_parts,
     photograph,
+    photograph_lie,
     shells,
     stage_view,
 )
+from pipelines.photo_fur.laid_fur import LaidFur
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
 from storage.stored_version import StoredVersion
@@ -72,7 +76,18 @@ def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
     photograph, mesh = load("attenuation", "pelt"), load("shell_mesh", "teapot")
     assert isinstance(photograph, FurPhotograph)
     assert isinstance(mesh, shells.ShellMesh)
-    drawn = frames.draw_frames(photograph, mesh, frames.ROUND_VIEWS, size=(72, 96), supersampling=1)
+    field, patches = load("lie_field", "teapot"), load("fur_patches", "teapot.pelt")
+    laid = LaidFur(
+        mesh.vertices[-1][patches.vertex],
+        mesh.normals[patches.vertex],
+        field[patches.vertex],
+        patches,
+        mesh.thickness,
+        mesh.layers,
+    )
+    drawn = frames.draw_laid_frames(
+        photograph, laid, frames.ROUND_VIEWS, (72, 96), 1, "end layers", lambda _: None
+    )
     stored = store.open(Slot("photo_fur", "fur_frames", "teapot.pelt"))
     np.testing.assert_array_equal(drawn.pictures, stored["frames"].values)
     np.testing.assert_array_equal(drawn.coverage, stored["coverage"].values)
@@ -85,6 +100,27 @@ def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
     )
     np.testing.assert_array_equal(stack.layer, found.layer)
     np.testing.assert_array_equal(stack.masks, found.masks)
+
+
+def test_the_plain_look_is_the_papers(good: Any) -> None:
+    store, slot = good.workspace.store, Slot("photo_fur", "fur_frames", "teapot.pelt")
+    full = store.open(slot)["frames"].values
+    good.launcher.launch(Request(FUR, [PELT_KEYS], given={"look": "plain"}))
+    plain = store.open(slot)["frames"].values
+    photograph, mesh = (
+        LOADERS[asset](StoredVersion(store, found, store.current(found)))
+        for asset, found in (
+            ("attenuation", Slot("photo_fur", "attenuation", "pelt")),
+            ("shell_mesh", Slot("photo_fur", "shell_mesh", "teapot")),
+        )
+    )
+    assert isinstance(photograph, FurPhotograph)
+    assert isinstance(mesh, shells.ShellMesh)
+    drawn = frames.draw_frames(photograph, mesh, frames.ROUND_VIEWS, size=(72, 96), supersampling=1)
+    np.testing.assert_array_equal(drawn.pictures, plain)
+    assert np.abs(plain.astype(float) - full).mean() > 5
+    good.launcher.launch(Request(FUR, [PELT_KEYS], preset="test"))
+    np.testing.assert_array_equal(store.open(slot)["frames"].values, full)
 
 
 def test_a_cut_out_goes_through_the_whole_graph(good: Any) -> None:
@@ -171,6 +207,23 @@ def _inside_out_teapot(right: Callable[..., Any], segments: int) -> Any:
     return Mesh(mesh.vertices, mesh.triangles[:, ::-1], mesh.uvs, -mesh.normals)
 
 
+def _sideways_field(
+    right: Callable[..., Any], vertices: Any, normals: Any, *others: Any
+) -> lie.LieField:
+    field: lie.LieField = right(vertices, normals, *others)
+    return field._replace(tangents=np.cross(normals, field.tangents))
+
+
+def _drawn_out_patches(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    laid = right(*arguments, **options)
+    return laid._replace(uvs=laid.uvs**3)
+
+
+def _turned_pieces(right: Callable[..., Any], *arguments: Any) -> Any:
+    piece = right(*arguments)
+    return piece._replace(directions=piece.directions + np.pi / 2)
+
+
 def _shuffled_pelt(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     pelt = right(*arguments, **options)
     pixels = pelt.radiance.reshape(-1, 3)
@@ -215,6 +268,9 @@ REGRESSIONS = (
     ),
     Regression("texture_stretch", shapes, "teapot", _stretched_teapot, PELT_KEYS),
     Regression("outward_share", shapes, "teapot", _inside_out_teapot, PELT_KEYS),
+    Regression("guide_error", lie, "lie_field", _sideways_field, PELT_KEYS),
+    Regression("strand_scale_spread", laying, "lay_patches", _drawn_out_patches, PELT_KEYS),
+    Regression("lie_error", photograph_lie, "pieces_of", _turned_pieces, PELT_KEYS),
     Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
     Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),
     Regression(

@@ -14,6 +14,7 @@ from pipelines.photo_fur.lie import (
     guides_along,
     guides_backwards,
     lie_field,
+    nose_to_tail,
 )
 
 
@@ -123,3 +124,10 @@ def test_what_cannot_be_followed_is_refused() -> None:
     alone = Stroke(np.zeros((2, 3)), 0.1)
     with pytest.raises(ValueError, match=r"stroke 0 has no length; expected two different points"):
         guides_along([alone], mesh.vertices, mesh.normals)
+
+
+def test_the_nose_is_at_the_higher_end_of_the_longer_side() -> None:
+    body = np.array([[-2.0, 0, 0], [2.0, 0, 0], [0, 1.0, 0.2], [0, -1.0, 0.2], [1.9, 0, 0.9]])
+    assert nose_to_tail(body).tolist() == [-1.0, 0.0, 0.0]
+    assert nose_to_tail(body * [-1, 1, 1]).tolist() == [1.0, 0.0, 0.0]
+    assert nose_to_tail(body[:, [1, 0, 2]]).tolist() == [0.0, -1.0, 0.0]

@@ -1,0 +1,172 @@
+"""How hair lies on the mesh, and the photograph laid along it: `lie_field`, `fur_patches`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from assets_defs.checks import Check
+from assets_defs.photo_fur.datasets import (
+    fur_patches_dataset,
+    laying_of,
+    lie_field_dataset,
+    opaque_of,
+    shell_mesh_of,
+)
+from assets_defs.photo_fur.declaration import FUR
+from assets_defs.settings import Settings
+from assets_defs.system import Pictures, Result
+from pipelines.photo_fur import figures
+from storage.schemas import photo_fur as schemas
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+# ---- lie_field -------------------------------------------------------------------------------
+
+
+class LieSettings(Settings):
+    """How the hair is to lie."""
+
+    backwards: tuple[float, float, float] | None = Field(
+        None,
+        description="Direction from nose to tail; by default along the longer side of the mesh's "
+        "box, away from its higher end",
+    )
+    gravity: float = Field(
+        0.5, ge=0.0, le=100.0, description="How much hair hangs down, over lying backwards"
+    )
+    smoothness: float = Field(
+        0.12, gt=0.0, le=10.0, description="Turns shorter than this are evened out, in mesh radii"
+    )
+
+
+def _guide_error(version: StoredVersion) -> float:
+    guides, tangents = (version.dataset[name].values for name in ("guides", "tangents"))
+    return figures.guide_error(guides, tangents)
+
+
+@FUR.asset(
+    schemas.LIE_FIELD,
+    by=("mesh",),
+    settings=LieSettings,
+    inputs=("shell_mesh",),
+    checks=(
+        Check(
+            "guide_error",
+            "Median angle between the hair and what was asked of it, by its strength, in degrees; "
+            "90 of hair that lies anyhow.",
+            _guide_error,
+            at_most=35.0,
+            change=2.0,
+        ),
+    ),
+)
+def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
+    """The smoothest field of directions that heeds nose, tail and gravity."""
+    import numpy as np
+
+    from pipelines.photo_fur import lie
+    from pipelines.photo_fur.shells import mesh_radius
+
+    mesh = shell_mesh_of(shell_mesh)
+    skin = mesh.vertices[-1]
+    given = settings.backwards
+    backwards = lie.nose_to_tail(skin) if given is None else np.array(given)
+    guides = lie.guides_backwards(mesh.normals, backwards, settings.gravity)
+    smoothness = settings.smoothness * mesh_radius(skin)
+    field = lie.lie_field(skin, mesh.normals, mesh.triangles, guides, smoothness)
+    shown = {
+        "nose to tail": ", ".join(f"{part:.3g}" for part in backwards),
+        "crowns and saddles": len(field.indices),
+    }
+    return lie_field_dataset(field, guides, backwards, shell_mesh.attrs["name"]), shown
+
+
+# ---- fur_patches -----------------------------------------------------------------------------
+
+
+class PatchSettings(Settings):
+    """How the photograph is laid."""
+
+    photograph_width: float = Field(
+        0.8, gt=0.0, le=100.0, description="Width of the photograph on the mesh, in mesh radii"
+    )
+    patches_across: float = Field(
+        5.5, ge=1.0, le=100.0, description="Patches that fit beside each other on a photograph"
+    )
+    patch_seed: int = Field(0, ge=0, description="Seed of the pieces that patches take")
+
+
+def _patch_pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.photo_fur.pictures import lie_picture
+
+    return {"lie": lie_picture(dataset["direction"].values, dataset["coherence"].values)}
+
+
+def _strand_scale_spread(version: StoredVersion) -> float:
+    skin = version.input("shell_mesh")["vertices"].values[-1]
+    laying = laying_of(version.dataset)
+    return figures.strand_scale_spread(skin, laying)
+
+
+def _lie_error(version: StoredVersion) -> float:
+    skin = version.input("shell_mesh")["vertices"].values[-1]
+    tangents = version.input("lie_field")["tangents"].values
+    dataset = version.dataset
+    return figures.laid_lie_error(
+        skin, tangents, laying_of(dataset), dataset["direction"].values, dataset["coherence"].values
+    )
+
+
+@FUR.asset(
+    schemas.FUR_PATCHES,
+    by=("photo", "mesh"),
+    settings=PatchSettings,
+    inputs=("fur_photo", "shell_mesh", "lie_field"),
+    pictures=_patch_pictures,
+    checks=(
+        Check(
+            "strand_scale_spread",
+            "Width of hairs at the 90th over that at the 10th percentile of the surface.",
+            _strand_scale_spread,
+            at_most=2.0,
+            change=0.1,
+        ),
+        Check(
+            "lie_error",
+            "Median angle between the laid photograph's hair and the field, in degrees; 90 of "
+            "patches turned anyhow.",
+            _lie_error,
+            at_most=40.0,
+            change=2.0,
+        ),
+    ),
+)
+def fur_patches(
+    settings: PatchSettings, fur_photo: xr.Dataset, shell_mesh: xr.Dataset, lie_field: xr.Dataset
+) -> Result:
+    """Lay the photograph over the mesh in patches, each turned along the lie."""
+    from pipelines.photo_fur.laying import REACH, lay_patches
+    from pipelines.photo_fur.photograph_lie import photograph_lie, pieces_of
+    from pipelines.photo_fur.shells import mesh_radius
+
+    mesh, opaque = shell_mesh_of(shell_mesh), opaque_of(fur_photo)
+    skin = mesh.vertices[-1].astype("float64")
+    width = settings.photograph_width * mesh_radius(skin)
+    lie = photograph_lie(fur_photo["luminance"].values, opaque)
+    laying = lay_patches(
+        skin,
+        mesh.triangles,
+        lie_field["tangents"].values.astype("float64"),
+        mesh.normals,
+        pieces_of(lie, REACH / settings.patches_across, opaque),
+        spacing=width / settings.patches_across,
+        width=width,
+        seed=settings.patch_seed,
+    )
+    shown = {"patches": len(laying.middles), "sign's skewness": lie.slant}
+    return fur_patches_dataset(laying, lie, width), shown

@@ -1,0 +1,137 @@
+"""Fur laid in patches: figures against plane geometry, pictures against the photograph itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipelines.drawing.colour import decode_srgb
+from pipelines.drawing.stage import Stage, orbit
+from pipelines.geometry.shapes import sphere, square
+from pipelines.photo_fur import figures
+from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
+from pipelines.photo_fur.laying import Laying, Piece, lay_patches
+from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
+from pipelines.photo_fur.stage_view import FurLight, fur_texture
+
+EAST = np.array([1.0, 0.0, 0.0])
+LAYERS = 12
+
+
+def photograph() -> FurPhotograph:
+    """Streaks along x, brown, of all brightnesses."""
+    rows = np.random.default_rng(0).random((64, 1))
+    grey = (
+        0.08 + 0.8 * np.repeat(rows, 64, axis=1) + 0.02 * np.random.default_rng(1).random((64, 64))
+    )
+    return fur_photograph((grey[..., None] * [0.9, 0.7, 0.5]).astype(np.float32))
+
+
+def flat_laying(directions: NDArray[np.floating]) -> tuple[NDArray[np.float64], Laying]:
+    mesh = square(16)
+    places = np.random.default_rng(2).uniform(0.3, 0.7, (len(directions), 2))
+    tangents = np.tile(EAST, (len(mesh.vertices), 1))
+    laying = lay_patches(
+        mesh.vertices,
+        mesh.triangles,
+        tangents,
+        mesh.normals,
+        Piece(places, directions),
+        spacing=0.25,
+        width=1.0,
+    )
+    return mesh.vertices, laying
+
+
+def test_weighted_median_is_that_of_repeated_values() -> None:
+    random = np.random.default_rng(3)
+    values, times = random.random(40), random.integers(1, 9, 40)
+    repeated = np.sort(np.repeat(values, times))
+    found = figures.weighted_median(values, times.astype(float))
+    assert found in (repeated[(len(repeated) - 1) // 2], repeated[len(repeated) // 2])
+
+
+def test_guide_error_is_the_angle_and_a_right_one_for_hair_that_lies_anyhow() -> None:
+    guides = np.random.default_rng(4).standard_normal((4000, 3)) * [1, 1, 0]
+    angle = np.radians(20)
+    turned = guides @ np.array(
+        [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    unit = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    assert figures.guide_error(guides, unit) == pytest.approx(20)
+    anyhow = np.random.default_rng(5).permutation(unit)
+    assert figures.guide_error(guides, anyhow) == pytest.approx(90, abs=4)
+
+
+def test_a_plane_has_hairs_of_one_width_along_the_lie() -> None:
+    points, laying = flat_laying(np.full(50, 0.3))
+    tangents = np.tile(EAST, (len(points), 1))
+    lies, sure = np.full((64, 64), 0.3), np.ones((64, 64))
+    assert figures.strand_scale_spread(points, laying) == pytest.approx(1, abs=1e-4)
+    assert figures.laid_lie_error(points, tangents, laying, lies, sure) < 0.01
+    _, anyhow = flat_laying(np.random.default_rng(6).uniform(0, 2 * np.pi, 50))
+    assert figures.laid_lie_error(points, tangents, anyhow, lies, sure) > 45
+
+
+def test_widths_of_hair_are_told_apart() -> None:
+    points, laying = flat_laying(np.zeros(50))
+    stretched = points * [1, 1, 1]
+    stretched[points[:, 0] > points[:, 0].mean(), 1] *= 4
+    assert figures.strand_scale_spread(stretched, laying) == pytest.approx(2, rel=0.1)
+
+
+def drawn(light: FurLight, elevation: float, photo: FurPhotograph) -> NDArray[np.float64]:
+    """Linear radiance (y, x, 3) of a flat fur, nothing beside it."""
+    points, laying = flat_laying(np.zeros(50))
+    normals = np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1))
+    tangents = np.tile(EAST, (len(laying.vertex), 1))
+    fur = LaidFur(points[laying.vertex].astype(np.float32), normals, tangents, laying, 0.05, LAYERS)
+    image = fur_texture(photo, LAYERS, tails="end layers")
+    middle = tuple(points.mean(axis=0).tolist())
+    with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
+        stage.add(laid_surface(fur, image, photo.attenuation, light))
+        stage.look(orbit(middle, 5.0, -90.0, elevation, height=0.5 * float(np.ptp(points[:, 0]))))
+        return decode_srgb(stage.frame().astype(np.float64) / 255)
+
+
+def test_from_above_under_light_from_above_it_is_as_bright_as_the_photograph() -> None:
+    """The photograph was taken so; patches show the higher of two hairs where they meet."""
+    photo = photograph()
+    found = drawn(FurLight(sky=0.0, headlight=1.0, lamp=0.0), 90.0, photo)
+    expected = photo.radiance.mean(axis=(0, 1))
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), expected, rtol=0.25)
+    np.testing.assert_allclose(
+        found.mean(axis=(0, 1)) / found.mean(), expected / expected.mean(), rtol=0.02
+    )
+    assert found.std() > 0.3 * photo.radiance.std()
+
+
+def test_fur_is_darker_under_light_from_the_side_and_black_without() -> None:
+    photo = photograph()
+
+    def mean(*towards: float) -> float:
+        way = np.array(towards) / np.linalg.norm(towards)
+        lamp = FurLight(sky=0.0, headlight=0.0, lamp=1.0, light=tuple(way.tolist()))
+        return float(drawn(lamp, 90.0, photo).mean())
+
+    above, aslant, low, below = mean(0, 0, 1), mean(0, 1, 1), mean(0, 4, 1), mean(0, 0, -1)
+    assert above > aslant > 1.3 * low > 0
+    assert below == 0
+
+
+def test_hair_scatters_more_light_across_than_along_itself() -> None:
+    """A lamp aslant across the hair, and one as much aslant from where the tips point."""
+    photo = photograph()
+    across, along = (
+        drawn(FurLight(0.0, 0.0, 1.0, way), 90.0, photo).mean()
+        for way in ((0.0, 0.7071, 0.7071), (0.7071, 0.0, 0.7071))
+    )
+    assert across > 1.15 * along
+
+
+def test_reach_holds_all_that_is_drawn() -> None:
+    mesh = sphere(8)
+    laying = Laying(*(np.zeros(0, int) for _ in Laying._fields))  # type: ignore[arg-type]
+    fur = LaidFur(mesh.vertices.astype(np.float32), mesh.normals, mesh.normals, laying, 0.1, 4)
+    assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * 1.8, abs=1e-5)
