@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.geometry.mesh_edges import edge_vertices
@@ -180,6 +179,8 @@ class _Charts(NamedTuple):
 
 def _charts(around: _Neighbours, middles: NDArray[np.int64], radius: float) -> _Charts:
     """Charts of all vertices within 1.5 radii of each middle along the surface."""
+    from pipelines.photo_fur.chart_kernel import follow  # numba, which not every user needs
+
     count = len(around.first) - 1
     parts = []
     for number, middle in enumerate(middles):
@@ -187,7 +188,7 @@ def _charts(around: _Neighbours, middles: NDArray[np.int64], radius: float) -> _
         (inside,) = np.nonzero(np.isfinite(far))
         order = inside[np.argsort(far[inside], kind="stable")]
         place = np.zeros((count, 2))
-        _follow(order, far, around.first, around.to, around.length, around.step, place)
+        follow(order, far, around.first, around.to, around.length, around.step, place)
         parts.append((inside, np.full(len(inside), number), place[inside]))
     vertex, patch, place = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.lexsort((patch, vertex))
@@ -215,30 +216,6 @@ def _weights(
     fading = np.where(alone, (rank == 0).astype(np.float64), fading)
     weights: NDArray[np.float64] = fading / np.where(alone, 1.0, total[vertex])
     return weights
-
-
-@njit(cache=True, nogil=True)
-def _follow(
-    order: NDArray[np.int64],
-    far: NDArray[np.float64],
-    first: NDArray[np.int64],
-    to: NDArray[np.int64],
-    length: NDArray[np.float64],
-    step: NDArray[np.float64],
-    place: NDArray[np.float64],
-) -> None:
-    """Fill places in the order of distance: the mean of what the neighbours before say."""
-    for position in range(1, len(order)):
-        vertex = order[position]
-        x, y, total = 0.0, 0.0, 0.0
-        for edge in range(first[vertex], first[vertex + 1]):
-            before = to[edge]
-            if far[before] < far[vertex]:
-                weight = 1.0 / (far[before] + length[edge] - far[vertex] + 0.1 * length[edge])
-                x += weight * (place[before, 0] - step[edge, 0])
-                y += weight * (place[before, 1] - step[edge, 1])
-                total += weight
-        place[vertex, 0], place[vertex, 1] = x / total, y / total
 
 
 # ---- patches ---------------------------------------------------------------------------------
