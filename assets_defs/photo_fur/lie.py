@@ -60,7 +60,7 @@ def _guide_error(version: StoredVersion) -> float:
             "Median angle between the hair and what was asked of it, by its strength, in degrees; "
             "90 of hair that lies anyhow.",
             _guide_error,
-            at_most=35.0,
+            at_most=60.0,
             change=2.0,
         ),
     ),
@@ -133,15 +133,15 @@ def _lie_error(version: StoredVersion) -> float:
             "strand_scale_spread",
             "Width of hairs at the 90th over that at the 10th percentile of the surface.",
             _strand_scale_spread,
-            at_most=2.0,
+            at_most=3.0,
             change=0.1,
         ),
         Check(
             "lie_error",
             "Median angle between the laid photograph's hair and the field, in degrees; 90 of "
-            "patches turned anyhow.",
+            "patches turned anyhow; a photograph without lines has some 40.",
             _lie_error,
-            at_most=40.0,
+            at_most=70.0,
             change=2.0,
         ),
     ),

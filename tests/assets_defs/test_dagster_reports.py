@@ -61,14 +61,14 @@ def test_a_missing_input_is_said_in_one_sentence_and_tried_once(house: Any) -> N
     done = _run(house, ("photo", "mesh"), "teapot|pelt")
     said = _failure(done).user_failure_data.description
     asset = said.partition("/pelt: ")[0]
-    assert asset.removeprefix("photo_fur/") in FUR.plans["fur_frames"].inputs
+    assert asset.removeprefix("photo_fur/") in FUR.plans["fur_patches"].inputs
     assert said == (
         f"{asset}/pelt: no version has passed its checks; expected one. Materialise {asset} first."
     )
     text = _report(house, done.run_id)
-    assert text.startswith(f"# photo_fur/fur_frames failed\n\n{said}\n")
+    assert text.startswith(f"# photo_fur/fur_patches failed\n\n{said}\n")
     assert "- partition: `teapot|pelt`" in text
-    assert '- photo_fur/fur_frames: `{"preset": "test"}`' in text
+    assert '- photo_fur/fur_patches: `{"preset": "test"}`' in text
     assert "- photo_fur/shell_mesh/teapot: none" in text
     assert f"/runs/{done.run_id}" in text
 
