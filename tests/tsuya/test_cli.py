@@ -62,6 +62,8 @@ def test_a_run_reports_figures_sizes_and_versions(made: dict[str, Any], home: Pa
         "photo_fur/attenuation/grass",
         "photo_fur/shell_stack/grass",
         "photo_fur/shell_mesh/square",
+        "photo_fur/lie_field/square",
+        "photo_fur/fur_patches/square.grass",
         "photo_fur/fur_frames/square.grass",
         "photo_fur/fur_package/square.grass",
     }
@@ -248,6 +250,7 @@ def test_the_gallery_writes_a_png_for_every_picture(
         "fur_photo-grass-photograph.png",
         "attenuation-grass-decay.png",
         "shell_stack-grass-layers.png",
+        "fur_patches-square.grass-lie.png",
         "fur_frames-square.grass-frames.png",
     }
     for path in (tmp_path / "photo_fur").iterdir():
