@@ -141,7 +141,7 @@ def weighted_median(values: NDArray[np.floating], weights: NDArray[np.floating])
 
 
 class LaidGradients(NamedTuple):
-    """How a photograph runs over the surface, by triangle and slot where the patch counts."""
+    """How a photograph runs over the surface: of each triangle the patch that weighs most."""
 
     triangle: NDArray[np.int64]
     """(n,)."""
@@ -163,8 +163,8 @@ def laid_gradients(skin: NDArray[np.floating], laying: Laying) -> LaidGradients:
     doubled = np.linalg.norm(normal, axis=1)
     uvs = laying.uvs.astype(np.float64)[laying.triangles]
     weight = laying.weights[laying.triangles]
-    counts = (weight > 0.2).all(axis=1) & (doubled > 1e-12 * doubled.max())[:, None]
-    triangle, slot = np.nonzero(counts)
+    (triangle,) = np.nonzero(doubled > 1e-12 * doubled.max())
+    slot = weight.mean(axis=1).argmax(axis=1)[triangle]
     frame = np.stack([one, two, normal], axis=1)[triangle]
     uv = uvs[triangle, :, slot]
     steps = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0], 0 * uv[:, 0]], axis=1)

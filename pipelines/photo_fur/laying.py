@@ -88,6 +88,13 @@ def lay_patches(
     return Laying(first[vertex], split, uvs, weights, shown, first[middles])
 
 
+def least_spacing(points: NDArray[np.floating], triangles: NDArray[np.integer]) -> float:
+    """How far apart patches' middles must be for a patch to hold most triangles about its own."""
+    edges = edge_vertices(triangles)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    return 1.2 * float(np.quantile(lengths, 0.9))
+
+
 # ---- the surface -----------------------------------------------------------------------------
 
 

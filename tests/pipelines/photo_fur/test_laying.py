@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import sphere, square, teapot
-from pipelines.photo_fur.laying import SLOTS, Laying, Piece, lay_patches
+from pipelines.photo_fur.laying import SLOTS, Laying, Piece, lay_patches, least_spacing
 from pipelines.photo_fur.lie import guides_backwards, lie_field
 
 
@@ -134,6 +134,20 @@ def test_equal_seeds_give_equal_patches_and_lengths_must_be_positive() -> None:
         laid(mesh, pieces(), spacing=0.0)
     with pytest.raises(ValueError, match=r"width is -1; expected a positive length\."):
         laid(mesh, pieces(), width=-1.0)
+
+
+def test_coarse_meshes_have_patches_as_wide_as_their_triangles() -> None:
+    """Else no patch would hold a whole triangle, and what is shown on it would be one colour."""
+    mesh = square(2)
+    spacing = least_spacing(mesh.vertices, mesh.triangles)
+    side = float(np.ptp(mesh.vertices[:, 0])) / 2
+    assert spacing == pytest.approx(1.2 * side * 2**0.5, rel=1e-6)
+    lay = laid(mesh, pieces(direction=0.0), spacing=spacing)
+    best = lay.weights[lay.triangles].mean(axis=1).argmax(axis=1)
+    for slot in range(SLOTS):
+        found, _ = gradients(mesh, lay, slot)
+        east = found[best == slot][:, :, 0]
+        np.testing.assert_allclose(east, np.tile([0.5, 0.0], (len(east), 1)), atol=1e-5)
 
 
 def test_a_body_smaller_than_a_patch_has_one() -> None:
