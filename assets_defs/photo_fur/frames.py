@@ -45,8 +45,8 @@ class FrameSettings(Settings):
     supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
     look: Literal["full", "plain"] = Field(
         "full",
-        description="Full: patches along the lie, light on hairs; plain: as in the paper. The "
-        "square is always plain",
+        description="Full: patches along the lie, light on hairs; plain: shells by texture "
+        "coordinates, as in the paper. The square is always plain",
     )
     tails: Tails = "end layers"
     fill: Fill = Field(

@@ -10,6 +10,10 @@ order of the method:
 3. ``shells``: a mesh's vertices offset along its normals, one set a layer (``make_shell_mesh``).
 4. ``stage_view``: all shells as one actor for ``drawing.stage`` (``fur_texture``, ``fur_surface``);
    ``frames``: pictures of it from several views (``draw_frames``).
+5. ``lie``: how hair lies on a body (``lie_field``); ``photograph_lie``: and in the photograph, of
+   which pieces may be taken (``pieces_of``); ``laying``: pieces laid over the body in patches
+   (``lay_patches``; ``chart_kernel`` is its compiled part); ``laid_fur``: these on the stage
+   (``laid_surface``), ``frames`` draws them (``draw_laid_frames``).
 
 ``pictures`` shows the histogram and the layers; ``figures`` tells whether results are right.
 """

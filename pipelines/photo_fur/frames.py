@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,34 +68,22 @@ def draw_frames(
     ``drawing.stage.NoGraphicsError`` where nothing can be drawn.
     """
     image = fur_texture(photograph, mesh.layers, tails=tails)
-    height, width = size
-    cameras = view_cameras(views, mesh.vertices.reshape(-1, 3), width / height)
-    pictures, coverage = [], []
-    for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
-        if progress is not None:
-            progress(done / len(views))
-        scale = 1 if view.as_photographed else supersampling
-        with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
-            stage.add(
-                fur_surface(
-                    mesh.vertices,
-                    mesh.normals,
-                    mesh.triangles,
-                    mesh.uvs,
-                    image,
-                    photograph.attenuation,
-                    fill=fill,
-                    wrap="mirrored",
-                    interpolate=not view.as_photographed,
-                    lit=not view.as_photographed,
-                )
-            )
-            stage.light(Light())
-            stage.look(camera)
-            picture = stage.radiance()
-        pictures.append(to_8bit(picture[..., :3]))
-        coverage.append(float(np.mean(picture[..., 3] > 0)))
-    return Frames(np.stack(pictures), np.array(coverage))
+
+    def fur(view: View) -> Any:
+        return fur_surface(
+            mesh.vertices,
+            mesh.normals,
+            mesh.triangles,
+            mesh.uvs,
+            image,
+            photograph.attenuation,
+            fill=fill,
+            wrap="mirrored",
+            interpolate=not view.as_photographed,
+            lit=not view.as_photographed,
+        )
+
+    return _taken(fur, mesh.vertices.reshape(-1, 3), views, size, supersampling, progress)
 
 
 def draw_laid_frames(
@@ -112,15 +100,35 @@ def draw_laid_frames(
     size: (height, width) of the pictures, pixels. Raises as ``draw_frames`` does.
     """
     image = fur_texture(photograph, fur.layers, tails=tails)
-    height, width = size
-    cameras = view_cameras(views, fur.reach, width / height)
-    pictures, coverage = [], []
-    for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
-        progress(done / len(views))
+
+    def laid(view: View) -> Any:
         lamp = orbit((0.0, 0.0, 0.0), 1.0, view.azimuth - _LAMP_BESIDE, _LAMP_ABOVE).position
         light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=lamp)
-        with Stage(width, height, background=BACKGROUND, supersampling=supersampling) as stage:
-            stage.add(laid_surface(fur, image, photograph.attenuation, light))
+        return laid_surface(fur, image, photograph.attenuation, light)
+
+    return _taken(laid, fur.reach, views, size, supersampling, progress)
+
+
+def _taken(
+    actor: Callable[[View], Any],
+    points: NDArray[np.float32],
+    views: Sequence[View],
+    size: tuple[int, int],
+    supersampling: int,
+    progress: Callable[[float], None] | None,
+) -> Frames:
+    """Pictures of what is drawn for each view, with all points (n, 3) in each; a lamp along the
+    view lights what does not light itself."""
+    height, width = size
+    pictures, coverage = [], []
+    cameras = view_cameras(views, points, width / height)
+    for done, (view, camera) in enumerate(zip(views, cameras, strict=True)):
+        if progress is not None:
+            progress(done / len(views))
+        scale = 1 if view.as_photographed else supersampling
+        with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
+            stage.add(actor(view))
+            stage.light(Light())
             stage.look(camera)
             picture = stage.radiance()
         pictures.append(to_8bit(picture[..., :3]))

@@ -55,7 +55,7 @@ def laid_surface(
 ) -> Any:
     """All shells as one actor, which lights itself; image from ``fur_texture`` for its layers."""
     layers, count = fur.layers, len(fur.skin)
-    laying = fur.laying
+    laying, uvs = fur.laying, texture_coordinates(fur.laying.uvs, image.shape[:2])
 
     def each(values: NDArray[np.floating]) -> NDArray[np.floating]:
         return np.tile(values, (layers, 1))
@@ -68,8 +68,8 @@ def laid_surface(
             "layer": np.repeat(np.arange(1, layers + 1), count),
             "outward": each(fur.normals),
             "along": each(fur.tangents),
-            "uvs": each(laying.uvs[:, :2].reshape(count, 4)),
-            "uvThird": each(laying.uvs[:, 2]),
+            "uvs": each(uvs[:, :2].reshape(count, 4)),
+            "uvThird": each(uvs[:, 2]),
             "weights": each(laying.weights),
         },
         textures={"photograph": texture(image, wrap="mirrored", srgb=True)},
@@ -90,3 +90,17 @@ def laid_surface(
         ),
         lit=False,
     )
+
+
+def texture_coordinates(
+    places: NDArray[np.floating], shape: tuple[int, ...]
+) -> NDArray[np.floating]:
+    """Places (…, 2) in a photograph of shape (height, width), which are in its widths, as textures
+    have them: 1 is the whole side of either axis.
+
+    >>> texture_coordinates(np.array([[0.5, 0.25]]), (50, 100)).tolist()
+    [[0.5, 0.5]]
+    """
+    height, width = shape
+    scaled: NDArray[np.floating] = places * np.array([1.0, width / height], places.dtype)
+    return scaled

@@ -10,7 +10,6 @@ a closed body other than a torus: their indices add up to its Euler characterist
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,15 +22,6 @@ Complex = NDArray[np.complex128]
 
 _LEAST_GUIDE = 1e-3
 """Of the strongest guide: without any the field would not be determined."""
-
-
-class Stroke(NamedTuple):
-    """A line drawn on the surface in the direction of the hair."""
-
-    points: NDArray[np.floating]
-    """(n, 3), two or more, in mesh units."""
-    reach: float
-    """How far from the line hair follows it, mesh units."""
 
 
 class LieField(NamedTuple):
@@ -110,36 +100,6 @@ def guides_backwards(
     upright = np.asarray(normals, np.float64)
     along: NDArray[np.float64] = wanted - (upright @ wanted)[:, None] * upright
     return along
-
-
-def guides_along(
-    strokes: Sequence[Stroke], vertices: NDArray[np.floating], others: NDArray[np.floating]
-) -> NDArray[np.float64]:
-    """Guides (V, 3) with those near strokes replaced by the strokes' directions, tenfold.
-
-    Raises ValueError for a stroke of fewer than two different points.
-    """
-    from scipy.spatial import cKDTree
-
-    guides = np.array(others, np.float64)
-    strength = 10.0 * max(1.0, float(np.linalg.norm(guides, axis=1).max(initial=0.0)))
-    for number, stroke in enumerate(strokes):
-        begin, end = stroke.points[:-1], stroke.points[1:]
-        lengths = np.linalg.norm(end - begin, axis=1)
-        if not (len(lengths) and lengths.max() > 0):
-            raise ValueError(f"stroke {number} has no length; expected two different points.")
-        pieces = np.maximum(1, np.ceil(4 * lengths / stroke.reach)).astype(int)
-        ways = np.repeat((end - begin) / np.maximum(lengths, 1e-30)[:, None], pieces, axis=0)
-        middles = np.concatenate(
-            [
-                a + (np.arange(count)[:, None] + 0.5) / count * (b - a)
-                for a, b, count in zip(begin, end, pieces, strict=True)
-            ]
-        )
-        distance, nearest = cKDTree(middles).query(vertices)
-        near = distance <= stroke.reach
-        guides[near] = strength * ways[nearest[near]]
-    return guides
 
 
 # ---- planes ----------------------------------------------------------------------------------

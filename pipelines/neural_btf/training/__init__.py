@@ -15,7 +15,7 @@ be encoded without training.
 
 ``plan`` says how to train (``TrainingPlan``) and ``data`` what is fitted (``training_data``);
 ``trainer`` goes through the plan's stages step by step (``train``) with what ``batches`` draws and
-``optimisers`` descends by.
+``optimisers`` descends by, ``muon`` among them.
 
 Every step draws from a generator seeded by its number: a run that was stopped and resumed gives
 what an uninterrupted one gives.

@@ -130,6 +130,42 @@ def test_hair_scatters_more_light_across_than_along_itself() -> None:
     assert across > 1.15 * along
 
 
+def test_a_photograph_that_is_not_square_is_not_drawn_out() -> None:
+    """Twice the same photograph, side by side and one above the other: seen at the same width of
+    one, hairs are equally wide."""
+
+    def spectrum(times: tuple[int, int]) -> NDArray[np.float64]:
+        one = photograph().radiance
+        points, laying = flat_laying(np.zeros(50))
+        scale = np.float32(1 / times[1])
+        laying = laying._replace(uvs=laying.uvs * scale)
+        fur = LaidFur(
+            points[laying.vertex].astype(np.float32),
+            np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1)),
+            np.tile(EAST, (len(laying.vertex), 1)),
+            laying,
+            0.05,
+            LAYERS,
+        )
+        photo = fur_photograph(np.tile(one, (*times, 1)))
+        image = fur_texture(photo, LAYERS, tails="end layers")
+        with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
+            stage.add(laid_surface(fur, image, photo.attenuation, FurLight()))
+            middle = tuple(points.mean(axis=0).tolist())
+            height = 0.5 * float(np.ptp(points[:, 0]))
+            stage.look(orbit(middle, 5.0, -90.0, 90.0, height=height))
+            green = stage.frame()[..., 1].astype(np.float64)
+        found: NDArray[np.float64] = np.abs(np.fft.rfft(green - green.mean(), axis=0)).mean(axis=1)
+        return found
+
+    def middle_frequency(values: NDArray[np.float64]) -> float:
+        return float((values * np.arange(len(values))).sum() / values.sum())
+
+    single = middle_frequency(spectrum((1, 1)))
+    assert middle_frequency(spectrum((1, 2))) == pytest.approx(single, rel=0.1)
+    assert middle_frequency(spectrum((2, 1))) == pytest.approx(single, rel=0.1)
+
+
 def test_reach_holds_all_that_is_drawn() -> None:
     mesh = sphere(8)
     laying = Laying(*(np.zeros(0, int) for _ in Laying._fields))  # type: ignore[arg-type]

@@ -10,8 +10,6 @@ from pipelines.geometry.meshes import Mesh, grid_triangles, make_mesh
 from pipelines.geometry.shapes import sphere, square, teapot
 from pipelines.photo_fur.lie import (
     LieField,
-    Stroke,
-    guides_along,
     guides_backwards,
     lie_field,
     nose_to_tail,
@@ -100,30 +98,12 @@ def test_noise_shorter_than_the_smoothness_is_evened_out() -> None:
     assert spread[1] < 5
 
 
-def test_a_stroke_is_followed_near_it() -> None:
-    mesh = square(40)
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    middle, size = (low + high) / 2, high - low
-    points = middle + size * np.array([[0.0, -0.4, 0.0], [0.0, 0.4, 0.0]])
-    others = np.tile([1.0, 0.0, 0.0], (len(mesh.vertices), 1))
-    guides = guides_along([Stroke(points, 0.06 * size[0])], mesh.vertices, others)
-    lie = laid(mesh, guides, 0.02 * size[0])
-    on = np.abs(mesh.vertices[:, 0] - middle[0]) < 0.03 * size[0]
-    on &= np.abs(mesh.vertices[:, 1] - middle[1]) < 0.3 * size[1]
-    far = np.abs(mesh.vertices[:, 0] - middle[0]) > 0.4 * size[0]
-    assert lie.tangents[on, 1].min() > 0.99
-    assert lie.tangents[far, 0].min() > 0.99
-
-
 def test_what_cannot_be_followed_is_refused() -> None:
     mesh = square(2)
     with pytest.raises(ValueError, match=r"smoothness is 0; expected a positive length\."):
         laid(mesh, mesh.normals, 0.0)
     with pytest.raises(ValueError, match=r"guides are all along the normals; expected"):
         laid(mesh, mesh.normals)
-    alone = Stroke(np.zeros((2, 3)), 0.1)
-    with pytest.raises(ValueError, match=r"stroke 0 has no length; expected two different points"):
-        guides_along([alone], mesh.vertices, mesh.normals)
 
 
 def test_the_nose_is_at_the_higher_end_of_the_longer_side() -> None:
