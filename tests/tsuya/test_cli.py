@@ -94,7 +94,7 @@ def test_what_was_mended_is_said_and_stays_with_the_version(home: Path) -> None:
 def test_a_second_run_says_in_a_table_that_all_is_current(made: dict[str, Any]) -> None:
     result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square")
     assert result.exit_code == 0
-    assert "0 made, 6 current already" in result.stdout
+    assert "0 made, 8 current already" in result.stdout
     assert "top_view_rmse" in result.stdout
 
 

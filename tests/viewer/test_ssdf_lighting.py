@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import time
 from collections.abc import Callable
@@ -108,7 +109,7 @@ def test_an_exr_is_refused_with_a_way_out(
 
 def test_the_decoders_fixture_is_what_python_says() -> None:
     stored = json.loads((CHECKOUT / "viewer" / "tests" / ssdf_fixture.NAME).read_text())
-    made = ssdf_fixture.values()
+    made = ssdf_fixture.values(base64.b64decode(stored["file"]))
     assert set(stored) == set(made)
     for name, value in made.items():
         if isinstance(value, str):
