@@ -19,16 +19,14 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from assets_defs.workspace import CHECKOUT
+from benchmarks.fur_oblique import oblique_figures
+from benchmarks.fur_pelts import calibrated_ends, depth_figures, judged_pelts, segmentation_figures
 from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance
 from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
 from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
-from pipelines.photo_fur.figures import (
-    depth_rank_correlation,
-    estimated_depth,
-    top_view_rmse,
-)
+from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
     SQUARE_VIEWS,
@@ -38,6 +36,7 @@ from pipelines.photo_fur.frames import (
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh
 from pipelines.photo_fur.stage_view import Fill, fur_surface, fur_texture
+from pipelines.virtual.pelt.hairs import GOLDEN
 from pipelines.virtual.pelt.pelt import make_pelt
 from storage.readers.photographs import builtin_photograph
 
@@ -49,13 +48,17 @@ PELT = {"size": 512, "hairs": 16_000, "samples": 24}
 SEEDS = (0, 1, 2)
 
 
-def run() -> dict[str, Any]:
-    """All figures, keyed as the documentation names them."""
+def run(scale: str) -> dict[str, Any]:
+    """All figures, keyed as the documentation names them; at scale paper with more pelts and less
+    noise, and the depths that the calibration finds anew."""
+    whole = scale == "paper"
     console = Console(stderr=True)
     figures: dict[str, Any] = {}
     steps: Sequence[tuple[str, Callable[[], dict[str, Any]]]] = (
         ("from above", _top_view),
         ("depth on the virtual pelt", _depth),
+        ("pelts never seen", lambda: _pelts(whole)),
+        ("seen from aside", lambda: oblique_figures(GOLDEN, 7, 32 if whole else 8)),
         ("photograph to masks", _derive),
         ("frames against the usual shells", _frames),
         ("frames a second", _speeds),
@@ -113,21 +116,23 @@ def _from_above(photo: FurPhotograph) -> float:
 
 
 def _depth() -> dict[str, Any]:
-    """Of darkness the order, and of Eq. 1's depths the error, beside the best constant depth's."""
-    correlations, errors, constants = [], [], []
+    """Rank correlation of darkness with the depth."""
+    correlations = []
     for seed in SEEDS:
         pelt = make_pelt(PELT["size"], PELT["hairs"], PELT["samples"], seed)
         grey = luminance(pelt.radiance)
         correlations.append(depth_rank_correlation(grey, pelt.depth))
-        found = estimated_depth(grey, fit_attenuation(grey, tail=TAIL))
-        errors.append(float(np.sqrt(np.mean((found - pelt.depth) ** 2))))
-        constants.append(float(pelt.depth.std()))
     return {
         "depth_rank_correlation": statistics.mean(correlations),
         "depth_rank_correlation_seeds": correlations,
-        "depth_rmse": statistics.mean(errors),
-        "depth_rmse_constant": statistics.mean(constants),
     }
+
+
+def _pelts(whole: bool) -> dict[str, Any]:
+    """Depth and segmentation on four kinds of pelts."""
+    pelts = judged_pelts(4 if whole else 3, 64 if whole else 32)
+    figures = depth_figures(pelts) | segmentation_figures(pelts)
+    return figures | (calibrated_ends(64) if whole else {})
 
 
 def _derive() -> dict[str, Any]:

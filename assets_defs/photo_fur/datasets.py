@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.drawing.colour import luminance
 from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
+from pipelines.photo_fur.figures import DepthFigures
 from pipelines.photo_fur.laid_fur import LaidFur
 from pipelines.photo_fur.laying import Laying
 from pipelines.photo_fur.lie import LieField
@@ -31,9 +32,11 @@ def photograph_dataset(
     *,
     depth: NDArray[np.float32] | None = None,
     opaque: NDArray[np.bool_] | None = None,
+    unevenness: float | None = None,
 ) -> xr.Dataset:
-    """`fur_photo` of a photograph (y, x, 3), and (y, x) the depth, where it is known, and where it
-    is opaque, in a cut-out."""
+    """`fur_photo` of a photograph (y, x, 3); (y, x) the depth, where it is known, and where there
+    is fur; and of one that was lit evenly the light's deviation before."""
+    import numpy as np
     import xarray as xr
 
     variables: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = {
@@ -44,6 +47,8 @@ def photograph_dataset(
         variables["depth"] = (_PIXELS, depth)
     if opaque is not None:
         variables["opaque"] = (_PIXELS, opaque)
+    if unevenness is not None:
+        variables["unevenness_before"] = ((), np.asarray(unevenness, np.float64))
     return xr.Dataset(variables, attrs={"name": name})
 
 
@@ -68,10 +73,8 @@ def seen_of(fur_photo: xr.Dataset, variable: str) -> NDArray[np.floating]:
     return values if opaque is None else values[opaque]
 
 
-def attenuation_dataset(
-    found: LayerHistogram, depth_rank_correlation: float | None = None
-) -> xr.Dataset:
-    """`attenuation` of a histogram and, where the true depth is known, the correlation with it."""
+def attenuation_dataset(found: LayerHistogram, known: DepthFigures | None = None) -> xr.Dataset:
+    """`attenuation` of a histogram and, where the true depth is known, how near it comes."""
     import numpy as np
     import xarray as xr
 
@@ -86,8 +89,10 @@ def attenuation_dataset(
         "bright_tail": ((), np.int64(found.bright_tail)),
         "dark_tail": ((), np.int64(found.dark_tail)),
     }
-    if depth_rank_correlation is not None:
-        variables["depth_rank_correlation"] = ((), depth_rank_correlation)
+    if known is not None:
+        variables["depth_rank_correlation"] = ((), known.rank_correlation)
+        variables["depth_rmse"] = ((), known.rmse)
+        variables["depth_rmse_constant"] = ((), known.rmse_constant)
     return xr.Dataset(variables)
 
 

@@ -50,7 +50,7 @@ FUR = System(
         ),
         Dimension(
             "mesh",
-            builtin=(SQUARE, "sphere", "teapot", "teapot-large"),
+            builtin=(SQUARE, "sphere", "teapot", "teapot-large", "animal"),
             examples=("teapot",),
             default="teapot",
             suffixes=(".ply", ".obj", ".stl", ".glb", ".gltf"),

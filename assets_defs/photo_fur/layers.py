@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from assets_defs.checks import Check
 from assets_defs.photo_fur.datasets import (
@@ -19,13 +19,15 @@ from assets_defs.photo_fur.declaration import FUR, Layers
 from assets_defs.settings import Settings
 from assets_defs.system import Pictures, Result
 from pipelines.photo_fur import figures
-from pipelines.photo_fur.attenuation import LayerHistogram, Tails
+from pipelines.photo_fur.attenuation import CALIBRATED_ENDS, PAPER_ENDS, LayerHistogram, Tails
 from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import xarray as xr
 
+
+_LEAST_DEPTH = 0.05
 
 # ---- attenuation -----------------------------------------------------------------------------
 
@@ -39,7 +41,21 @@ class AttenuationSettings(Settings):
         lt=0.5,
         description="Share of the pixels cut off at each end of the histogram",
     )
+    ends: tuple[float, float] = Field(
+        CALIBRATED_ENDS,
+        description="Depths of the brightest and the darkest of these pixels; the paper has 0, 1",
+    )
     layers: Layers = 15
+
+    @field_validator("ends")
+    @classmethod
+    def _deeper(cls, ends: tuple[float, float]) -> tuple[float, float]:
+        if not ends[1] - ends[0] >= _LEAST_DEPTH:
+            raise ValueError(
+                f"ends is {ends[0]:g}, {ends[1]:g}; expected the darkest pixels at least "
+                f"{_LEAST_DEPTH:g} deeper than the brightest."
+            )
+        return ends
 
 
 def _attenuation_pictures(dataset: xr.Dataset) -> Pictures:
@@ -74,6 +90,15 @@ def _depth_rank_correlation(version: StoredVersion) -> float | None:
     if "depth_rank_correlation" not in dataset:
         return None
     return float(dataset["depth_rank_correlation"])
+
+
+def _depth_rmse_ratio(version: StoredVersion) -> float | None:
+    """None of the paper's own reading, too, which is worse than any constant depth."""
+    dataset = version.dataset
+    paper = tuple(version.record["settings"]["ends"]) == PAPER_ENDS
+    if paper or "depth_rmse" not in dataset:
+        return None
+    return float(dataset["depth_rmse"] / dataset["depth_rmse_constant"])
 
 
 def _rows(found: LayerHistogram) -> list[dict[str, Any]]:
@@ -113,6 +138,13 @@ def _rows(found: LayerHistogram) -> list[dict[str, Any]]:
             at_least=0.5,
             change=0.02,
         ),
+        Check(
+            "depth_rmse_ratio",
+            "RMSE of the depth by Eq. 1 over that of the best constant depth, on the virtual pelt.",
+            _depth_rmse_ratio,
+            at_most=0.85,
+            change=0.02,
+        ),
     ),
 )
 def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
@@ -120,17 +152,19 @@ def attenuation(settings: AttenuationSettings, fur_photo: xr.Dataset) -> Result:
     from pipelines.photo_fur.attenuation import layer_histogram
 
     luminance = seen_of(fur_photo, "luminance")
-    found = layer_histogram(luminance, tail=settings.tail, layers=settings.layers)
+    found = layer_histogram(
+        luminance, tail=settings.tail, layers=settings.layers, ends=settings.ends
+    )
     shown = {
         "Imax": found.attenuation.brightest,
         "Imin": found.attenuation.darkest,
         "attenuation a": found.attenuation.coefficient,
     }
-    correlation = None
+    known = None
     if "depth" in fur_photo:
-        correlation = figures.depth_rank_correlation(luminance, fur_photo["depth"].values)
-        shown["depth rank correlation"] = correlation
-    return attenuation_dataset(found, correlation), {**shown, "layers": _rows(found)}
+        known = figures.depth_figures(luminance, found.attenuation, fur_photo["depth"].values)
+        shown |= {"depth rank correlation": known.rank_correlation, "depth RMSE": known.rmse}
+    return attenuation_dataset(found, known), {**shown, "layers": _rows(found)}
 
 
 # ---- shell_stack -----------------------------------------------------------------------------

@@ -95,8 +95,12 @@ class PatchSettings(Settings):
     photograph_width: float = Field(
         0.8, gt=0.0, le=100.0, description="Width of the photograph on the mesh, in mesh radii"
     )
-    patches_across: float = Field(
-        5.5, ge=1.0, le=100.0, description="Patches that fit beside each other on a photograph"
+    patches_across: float | None = Field(
+        None,
+        ge=1.0,
+        le=100.0,
+        description="Patches that fit beside each other on a photograph; by default so many that "
+        "a patch is half as wide as the fur in it, 5.5 of a square of fur",
     )
     patch_seed: int = Field(0, ge=0, description="Seed of the pieces that patches take")
 
@@ -152,20 +156,21 @@ def fur_patches(
 ) -> Result:
     """Lay the photograph over the mesh in patches, each turned along the lie."""
     from pipelines.photo_fur.laying import REACH, lay_patches, least_spacing
-    from pipelines.photo_fur.photograph_lie import photograph_lie, pieces_of
+    from pipelines.photo_fur.photograph_lie import disc_radius, photograph_lie, pieces_of
     from pipelines.photo_fur.shells import mesh_radius
 
     mesh, opaque = shell_mesh_of(shell_mesh), opaque_of(fur_photo)
     skin = mesh.vertices[-1].astype("float64")
     width = settings.photograph_width * mesh_radius(skin)
     lie = photograph_lie(fur_photo["luminance"].values, opaque)
-    spacing = max(width / settings.patches_across, least_spacing(skin, mesh.triangles))
+    across = settings.patches_across or REACH / disc_radius(lie.direction.shape, opaque)
+    spacing = max(width / across, least_spacing(skin, mesh.triangles))
     laying = lay_patches(
         skin,
         mesh.triangles,
         lie_field["tangents"].values.astype("float64"),
         mesh.normals,
-        pieces_of(lie, REACH * spacing / width, opaque),
+        pieces_of(lie, REACH * spacing / width, opaque, fur_photo["radiance"].values),
         spacing=spacing,
         width=width,
         seed=settings.patch_seed,

@@ -71,13 +71,14 @@ def _expected_photograph(version: StoredVersion, layers: int) -> NDArray[np.uint
     from scipy.ndimage import distance_transform_edt
 
     photo, medium = version.input("fur_photo"), attenuation_of(version.input("attenuation"))
-    luminance, opaque = photo["luminance"].values, opaque_of(photo)
+    # In double precision: beside a Python float NumPy would compare single ones.
+    luminance, opaque = photo["luminance"].values.astype(np.float64), opaque_of(photo)
     ratio, steps = medium.darkest / medium.brightest, 255 // layers
     layer = np.ones(luminance.shape, np.int64)
     for n in range(1, layers):
         layer += luminance <= medium.brightest * ratio ** (n / layers)
     with np.errstate(divide="ignore"):
-        depth = np.log(medium.brightest / luminance.astype(np.float64)) / -np.log(ratio)
+        depth = np.log(medium.brightest / luminance) / -np.log(ratio)
     within = np.clip(depth * layers - (layer - 1.0), 0.0, 1.0)
     code = (layer - 1) * steps + np.minimum((within * steps).astype(np.int64), steps - 1)
     if version.record["settings"]["tails"] == "dropped":

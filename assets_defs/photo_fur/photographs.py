@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.photo_fur.datasets import photograph_dataset, seen_of
+from assets_defs.photo_fur.datasets import opaque_of, photograph_dataset, seen_of
 from assets_defs.photo_fur.declaration import FUR, PELT
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
@@ -18,7 +18,9 @@ from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
 
 class PhotoSettings(Settings):
@@ -27,6 +29,11 @@ class PhotoSettings(Settings):
     crop: tuple[int, int, int, int] | None = Field(
         None, description="Left, top, width, height in pixels; the whole photograph by default"
     )
+    segment: bool = Field(
+        True,
+        description="Find the fur, where neither a crop nor transparent pixels say where it is",
+    )
+    even: bool = Field(True, description="Take the light's slope out of the photograph")
     largest_side: int = Field(
         1024, ge=64, le=8192, description="Longer side in pixels; larger photographs are averaged"
     )
@@ -42,9 +49,9 @@ class PhotoSettings(Settings):
 
 
 def _pictures(dataset: xr.Dataset) -> Pictures:
-    from pipelines.drawing.colour import to_8bit
+    from pipelines.photo_fur.suitability import report_picture
 
-    return {"photograph": to_8bit(dataset["radiance"].values)}
+    return {"photograph": report_picture(dataset["radiance"].values, opaque_of(dataset))}
 
 
 def _contrast(version: StoredVersion) -> float:
@@ -55,9 +62,25 @@ def _clipped_share(version: StoredVersion) -> float:
     return figures.clipped_share(seen_of(version.dataset, "radiance"))
 
 
+def _fur_share(version: StoredVersion) -> float:
+    opaque = opaque_of(version.dataset)
+    return 1.0 if opaque is None else float(opaque.mean())
+
+
+def _unevenness(version: StoredVersion) -> float | None:
+    """None of what is left as it is: the virtual pelt, and where a setting says so."""
+    dataset = version.dataset
+    if "unevenness_before" not in dataset:
+        return None
+    return figures.unevenness(dataset["luminance"].values, opaque_of(dataset))
+
+
 def _read(source: Source, settings: PhotoSettings) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """A photograph of the user's or a built-in one, exposed and brought to size, with its notes."""
+    """A photograph of the user's or a built-in one, exposed, brought to size and evenly lit, with
+    where its fur is, and with notes."""
     from pipelines.photo_fur.photograph import expose, fit_cutout, fit_size
+    from pipelines.photo_fur.segmentation import fur_mask
+    from pipelines.photo_fur.suitability import evenly_lit
     from storage.readers.photographs import builtin_photograph, read_photograph
 
     raw = (
@@ -65,11 +88,33 @@ def _read(source: Source, settings: PhotoSettings) -> tuple[xr.Dataset, tuple[st
         if source.path is None
         else read_photograph(source.path, settings.crop)
     )
-    exposed = expose(raw.radiance, raw.opaque)
-    if raw.opaque is None:
-        return photograph_dataset(fit_size(exposed, settings.largest_side), source.name), raw.notes
-    radiance, opaque = fit_cutout(exposed, raw.opaque, settings.largest_side)
-    return photograph_dataset(radiance, source.name, opaque=opaque), raw.notes
+    radiance, opaque = expose(raw.radiance, raw.opaque), raw.opaque
+    notes = raw.notes
+    if opaque is not None:
+        radiance, opaque = fit_cutout(radiance, opaque, settings.largest_side)
+    else:
+        radiance = fit_size(radiance, settings.largest_side)
+        if settings.segment and settings.crop is None:
+            opaque = fur_mask(radiance)
+            notes = (*notes, *_said_of(opaque, raw.radiance.shape[1]))
+    unevenness = None
+    if settings.even:
+        radiance, unevenness = evenly_lit(radiance, opaque)
+    return photograph_dataset(radiance, source.name, opaque=opaque, unevenness=unevenness), notes
+
+
+def _said_of(fur: NDArray[np.bool_] | None, width: int) -> tuple[str, ...]:
+    """What a note says of fur found in a photograph that was as wide before it was averaged."""
+    from pipelines.photo_fur.segmentation import largest_square
+
+    if fur is None:
+        return ()
+    scale = width / fur.shape[1]
+    left, top, side = (int(scale * value) for value in largest_square(fur))
+    return (
+        f"{fur.mean():.0%} of the photograph was found to be fur, the rest is left out; "
+        f"a crop of {left},{top},{side},{side} is all fur, segment=false takes the whole.",
+    )
 
 
 @FUR.asset(
@@ -92,6 +137,19 @@ def _read(source: Source, settings: PhotoSettings) -> tuple[xr.Dataset, tuple[st
             _clipped_share,
             at_most=0.05,
             change=0.005,
+        ),
+        Check(
+            "fur_share",
+            "Share of the photograph that is fur.",
+            _fur_share,
+            at_least=0.15,
+            change=0.05,
+        ),
+        Check(
+            "unevenness",
+            "Deviation of the light's slope over the fur, in logarithms; 0.7 halves and doubles.",
+            _unevenness,
+            at_most=0.15,
         ),
     ),
 )

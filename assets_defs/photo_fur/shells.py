@@ -71,6 +71,7 @@ def _outward_share(version: StoredVersion) -> float:
 def _read(source: Source, settings: MeshSettings) -> MendedMesh:
     """A mesh of the user's, upright and repaired, or a built-in one."""
     from pipelines.geometry import shapes
+    from pipelines.geometry.eared_body import eared_body
     from pipelines.geometry.mended_meshes import MendedMesh, mend_mesh
     from pipelines.geometry.meshes import brought_near, y_up_to_z_up
     from storage.readers.gltf import SUFFIXES
@@ -88,6 +89,7 @@ def _read(source: Source, settings: MeshSettings) -> MendedMesh:
         "sphere": lambda: shapes.sphere(64),
         "teapot": lambda: shapes.teapot(8),
         "teapot-large": lambda: shapes.teapot(33),
+        "animal": eared_body,
     }[source.key]()
     return MendedMesh(built_in, ())
 

@@ -26,6 +26,13 @@ DROPPED = 255
 """Depth code of a pixel that no layer shows."""
 
 
+PAPER_ENDS = (0.0, 1.0)
+"""Depths at Imax and Imin as the paper has them: the surface and the skin."""
+CALIBRATED_ENDS = (0.36, 1.04)
+"""The same for a family of virtual pelts of known depth (`python -m benchmarks fur --scale paper`):
+over the top third nothing shades the hair, so that it is as bright there as at the tips."""
+
+
 class Attenuation(NamedTuple):
     """The medium: luminance at the surface and at the skin, and the decay between them."""
 
@@ -38,6 +45,19 @@ class Attenuation(NamedTuple):
     def coefficient(self) -> float:
         """a, per thickness (Eq. 2 with hb = 1)."""
         return float(-np.log(self.darkest / self.brightest))
+
+    def with_ends_at(self, ends: tuple[float, float]) -> Attenuation:
+        """The medium in which these two luminances lie at other depths than 0 and 1.
+
+        >>> Attenuation(0.5, 0.125).with_ends_at((0.5, 1.0))  # halved four times to the skin
+        Attenuation(brightest=2.0, darkest=0.125)
+        """
+        if ends == PAPER_ENDS:
+            return self
+        at_brightest, at_darkest = ends
+        decay = self.coefficient / (at_darkest - at_brightest)
+        surface = float(self.brightest * np.exp(decay * at_brightest))
+        return Attenuation(surface, float(surface * np.exp(-decay)))
 
     def luminance_at(self, depth: NDArray[np.floating]) -> NDArray[np.floating]:
         """I(h) for depths as fractions of the thickness (Eq. 1)."""
@@ -189,17 +209,24 @@ class LayerHistogram(NamedTuple):
     """Pixels darker than Imin."""
 
 
-def layer_histogram(luminance: NDArray[np.floating], *, tail: float, layers: int) -> LayerHistogram:
+def layer_histogram(
+    luminance: NDArray[np.floating],
+    *,
+    tail: float,
+    layers: int,
+    ends: tuple[float, float] = PAPER_ENDS,
+) -> LayerHistogram:
     """Fit the medium to a photograph (``fit_attenuation``) and count the pixels of every layer.
 
-    Raises ValueError as ``fit_attenuation`` does and for a number of layers that cannot be drawn.
+    ends: depths of the brightest and the darkest pixels within the tails. Raises ValueError as
+    ``fit_attenuation`` does and for a number of layers that cannot be drawn.
 
     >>> import numpy as np
     >>> found = layer_histogram(np.linspace(0.1, 0.8, 50), tail=0.02, layers=3)
     >>> found.pixels_per_layer.tolist(), found.bright_tail, found.dark_tail
     ([27, 13, 8], 1, 1)
     """
-    attenuation = fit_attenuation(luminance, tail=tail)
+    attenuation = fit_attenuation(luminance, tail=tail).with_ends_at(ends)
     layer = layer_of(luminance, attenuation, layers, tails="dropped")
     return LayerHistogram(
         attenuation,

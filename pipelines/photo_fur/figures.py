@@ -23,6 +23,14 @@ def clipped_share(radiance: NDArray[np.floating]) -> float:
     return float((radiance >= 1.0).all(axis=-1).mean())
 
 
+def unevenness(grey: NDArray[np.floating], fur: NDArray[np.bool_] | None = None) -> float:
+    """Deviation over the fur (y, x) of the logarithm of the light's slope in a luminance (y, x)."""
+    from pipelines.photo_fur.suitability import light_slope
+
+    slope = light_slope(grey, fur)
+    return float((slope if fur is None else slope[fur]).std())
+
+
 def kept_share(pixels_per_layer: NDArray[np.integer], histogram: NDArray[np.integer]) -> float:
     """Share of the pixels between Imin and Imax: those of all layers among all in the histogram."""
     return float(pixels_per_layer.sum() / histogram.sum())
@@ -47,6 +55,29 @@ def estimated_depth(
     """Depth by Eq. 1 as a fraction of the thickness: 0 at Imax and above, 1 at Imin and below."""
     inside = np.clip(luminance, attenuation.darkest, attenuation.brightest)
     return np.log(attenuation.brightest / inside) / attenuation.coefficient
+
+
+class DepthFigures(NamedTuple):
+    """How near depth by Eq. 1 comes to the true one."""
+
+    rank_correlation: float
+    """Of darkness with depth: 1 = brightness orders depth."""
+    rmse: float
+    """In thicknesses."""
+    rmse_constant: float
+    """Of the true depth's mean everywhere."""
+
+
+def depth_figures(
+    luminance: NDArray[np.floating], attenuation: Attenuation, depth: NDArray[np.floating]
+) -> DepthFigures:
+    """Compare Eq. 1 with the true depth of each pixel."""
+    step = estimated_depth(luminance, attenuation) - depth
+    return DepthFigures(
+        depth_rank_correlation(luminance, depth),
+        float(np.sqrt(np.mean(step**2))),
+        float(np.std(depth, dtype=np.float64)),
+    )
 
 
 def partition_error(

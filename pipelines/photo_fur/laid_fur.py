@@ -3,9 +3,10 @@
 The shells bend over along the lie. Where patches meet the higher hair wins, so that hairs stay
 whole (of two that are mixed neither is left). Light falls on hairs, not on the surface: Kajiya and
 Kay's fibre with Goldman's directionality, "Fake fur rendering" (1997), over its own value for light
-from straight above, under which the photograph was taken; and with the shadow of the fur above,
-exp(-a h (1 / cos t - 1)), likewise over that of light from above (Eq. 1 has darkened the photograph
-once).
+from straight above, under which the photograph was taken. The photograph has its shadows from
+light along the view; so has every picture under light along its view, whatever the angle: the hot
+spot of Hapke, "Bidirectional reflectance spectroscopy 4" (1986). Light from aside finds more
+shadows, the deeper in the fur and the lower the lamp.
 """
 
 from __future__ import annotations
@@ -16,17 +17,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
-from pipelines.drawing.stage import surface, texture
+from pipelines.drawing.stage import Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, code_steps
 from pipelines.photo_fur.laying import Laying
 from pipelines.photo_fur.stage_view import FurLight
 
-BEND = 0.8
+BEND = 0.5
 """How far tips lean along the lie, in thicknesses."""
 HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
+
+
+SHADING = {
+    "HOT_SPOT": 0.35,  # radians from the view within which a lamp lights all that is seen
+    "SLANT": 0.1,  # lengths of attenuation that slanting light has more of than light from above
+    "MOST_SLANT": 0.8,
+    "BELOW": 0.5,  # how fast a hair darkens below its tip, of the medium's attenuation
+    "DUSK": 0.35,  # cosine from which on, before and behind the horizon, a lamp fades
+    "ASIDE": 0.85,  # of a lamp's light, what shadows of hair on hair leave
+    "FIBRE": 0.5,  # power of the fibre's light
+    "TILT": 2.0,  # of hair, tangent of the angle from upright
+}
+"""How light falls on hair, fitted to a traced pelt that is in no figure."""
 
 
 class LaidFur(NamedTuple):
@@ -51,9 +65,16 @@ class LaidFur(NamedTuple):
 
 
 def laid_surface(
-    fur: LaidFur, image: NDArray[np.uint8], attenuation: Attenuation, light: FurLight
+    fur: LaidFur,
+    image: NDArray[np.uint8],
+    attenuation: Attenuation,
+    light: FurLight,
+    wrap: Wrap = "mirrored",
 ) -> Any:
-    """All shells as one actor, which lights itself; image from ``fur_texture`` for its layers."""
+    """All shells as one actor, which lights itself; image from ``fur_texture`` for its layers.
+
+    wrap: what is beyond the photograph; of one that is a tile, "repeat".
+    """
     layers, count = fur.layers, len(fur.skin)
     laying, uvs = fur.laying, texture_coordinates(fur.laying.uvs, image.shape[:2])
 
@@ -72,7 +93,7 @@ def laid_surface(
             "uvThird": each(uvs[:, 2]),
             "weights": each(laying.weights),
         },
-        textures={"photograph": texture(image, wrap="mirrored", srgb=True)},
+        textures={"photograph": texture(image, wrap=wrap, srgb=True)},
         shader=surface_shader(
             "fur_laid_vertex.glsl",
             "fur_laid_fragment.glsl",
@@ -83,6 +104,7 @@ def laid_surface(
             BEND=BEND,
             HEIGHT_OF_WEIGHT=HEIGHT_OF_WEIGHT,
             GLOSS=GLOSS,
+            **SHADING,
             SKY=float(light.sky),
             HEADLIGHT=float(light.headlight),
             LAMP=float(light.lamp),

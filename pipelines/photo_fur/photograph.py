@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import luminance
-from pipelines.photo_fur.attenuation import Attenuation, fit_attenuation
+from pipelines.photo_fur.attenuation import PAPER_ENDS, Attenuation, fit_attenuation
 
 HIGHLIGHT_SHARE = 0.001
 """Share of the channels' values that may clip when an HDR photograph is exposed."""
@@ -26,11 +26,17 @@ class FurPhotograph(NamedTuple):
     """(y, x): where there is fur; None for everywhere."""
 
 
-def fur_photograph(radiance: NDArray[np.floating], *, tail: float = 0.005) -> FurPhotograph:
+def fur_photograph(
+    radiance: NDArray[np.floating],
+    *,
+    tail: float = 0.005,
+    ends: tuple[float, float] = PAPER_ENDS,
+) -> FurPhotograph:
     """Luminance and medium of a photograph (y, x, 3) that is exposed already (``expose``).
 
-    ``tail``: share of the pixels cut off at each end of the histogram. Raises ValueError where the
-    photograph has a single luminance.
+    ``tail``: share of the pixels cut off at each end of the histogram; ``ends``: depths of the
+    brightest and darkest pixels that are left (``CALIBRATED_ENDS``, or the paper's). Raises
+    ValueError where the photograph has a single luminance.
 
     >>> import numpy as np
     >>> radiance = np.linspace(0.1, 0.9, 192).reshape(8, 8, 3)
@@ -39,7 +45,8 @@ def fur_photograph(radiance: NDArray[np.floating], *, tail: float = 0.005) -> Fu
     ((8, 8), 2.16)
     """
     grey = luminance(radiance)
-    return FurPhotograph(radiance, grey, fit_attenuation(grey, tail=tail))
+    medium = fit_attenuation(grey, tail=tail).with_ends_at(ends)
+    return FurPhotograph(radiance, grey, medium)
 
 
 def expose(

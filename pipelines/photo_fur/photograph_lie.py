@@ -21,6 +21,10 @@ _NEIGHBOURHOOD = 1 / 32
 """Deviation of that over which tensors are averaged, in shorter sides of the photograph."""
 _STEP = 3.0
 """Pixels between the brightnesses whose differences tell the sign."""
+_DISC = 0.275
+"""Radius of a piece, in sides of a square as large as the fur."""
+_LEAST_FUR, _LEAST_INSIDE = 0.8, 0.35
+"""Of a piece: the share that is fur, and its middle's distance to what is none, in radii."""
 _LEAST_COHERENCE = 0.5
 """Of a piece, in that of the photograph's median."""
 
@@ -70,34 +74,81 @@ def photograph_lie(
     return PhotographLie(np.angle(np.exp(1j * direction)), coherence, slant)
 
 
-def pieces_of(lie: PhotographLie, radius: float, opaque: NDArray[np.bool_] | None = None) -> Piece:
+def disc_radius(shape: tuple[int, ...], opaque: NDArray[np.bool_] | None = None) -> float:
+    """Of discs of which some fit beside each other into the fur of a photograph, in its widths.
+
+    >>> round(disc_radius((64, 64)), 3), round(disc_radius((64, 128)), 3)
+    (0.275, 0.194)
+    """
+    area = float(np.prod(shape)) if opaque is None else float(opaque.sum())
+    return float(_DISC * np.sqrt(area) / shape[1])
+
+
+def pieces_of(
+    lie: PhotographLie,
+    radius: float,
+    opaque: NDArray[np.bool_] | None = None,
+    radiance: NDArray[np.floating] | None = None,
+) -> Piece:
     """Places of a photograph about which a disc of ``radius``, in photograph widths, is fur that
     lies one way, with how it lies there.
 
-    A photograph smaller than such a disc has one in its middle. Raises ValueError where no disc
-    is fur.
+    With the photograph's radiance (y, x, 3) of these only the half whose colour is nearest to all
+    places' median: a coat of many colours would be laid as a patchwork.
+
+    Up to a fifth of a disc, at its rim, may be no fur: other patches cover it. A photograph smaller
+    than a disc has one in its middle. Raises ValueError where no disc is fur.
     """
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     height, width = lie.direction.shape
     shown = np.ones((height, width), bool) if opaque is None else opaque
     within = distance_transform_edt(np.pad(shown, 1))[1:-1, 1:-1]
-    wanted = min(radius * width, 0.98 * float(within.max()))
+    to_border = distance_transform_edt(np.pad(np.ones_like(shown), 1))[1:-1, 1:-1]
     if within.max() < 2:
         raise ValueError("no part of the photograph is fur; expected a disc of it.")
+    wanted = min(radius * width, 0.98 * float(to_border.max()))
     pointing = np.exp(1j * lie.direction) * lie.coherence * shown
     mean = gaussian_filter(pointing.real, wanted / 2) + 1j * gaussian_filter(
         pointing.imag, wanted / 2
     )
-    allowed = (within >= wanted) & (np.abs(mean) >= _LEAST_COHERENCE * np.median(np.abs(mean)))
+    share = gaussian_filter(shown.astype(np.float64), wanted / 2, mode="nearest")
+    deepest = within >= 0.98 * within.max()
+    inside = (to_border >= wanted) & (within >= _LEAST_INSIDE * wanted) & (share >= _LEAST_FUR)
+    if not inside.any():
+        inside = deepest
+    allowed = inside & (np.abs(mean) >= _LEAST_COHERENCE * np.median(np.abs(mean[inside])))
     if not allowed.any():
-        allowed = within >= wanted
+        allowed = inside
     step = max(1, round(wanted / 4))
     on_grid = np.zeros_like(allowed)
     on_grid[::step, ::step] = True
     rows, columns = np.nonzero(allowed & on_grid if (allowed & on_grid).any() else allowed)
+    if radiance is not None:
+        alike = _of_one_colour(radiance, shown, wanted / 2, (rows, columns))
+        rows, columns = rows[alike], columns[alike]
     places = np.stack([columns + 0.5, height - rows - 0.5], axis=-1) / width
     return Piece(places, np.angle(mean[rows, columns]))
+
+
+def _of_one_colour(
+    radiance: NDArray[np.floating],
+    shown: NDArray[np.bool_],
+    reach: float,
+    places: tuple[NDArray[np.integer], NDArray[np.integer]],
+) -> NDArray[np.bool_]:
+    """Whether the colour about each place is among the half nearest to their median, in logarithms
+    of light."""
+    from scipy.ndimage import gaussian_filter
+
+    share = np.maximum(gaussian_filter(shown.astype(np.float64), reach), 1e-3)
+    means = [
+        gaussian_filter(np.where(shown, radiance[..., k], 0).astype(np.float64), reach) / share
+        for k in range(3)
+    ]
+    colours = np.log(np.maximum(np.stack(means, axis=-1), 1e-3))[places]
+    apart = np.linalg.norm(colours - np.median(colours, axis=0), axis=-1)
+    return np.asarray(apart <= np.median(apart))
 
 
 def _towards_the_mean(

@@ -42,6 +42,9 @@ BUILTIN_PHOTOGRAPHS = {
     "chelsea": BuiltinPhotograph(
         "chelsea.png", (88, 14, 112, 64), "A tabby cat's forehead (Stefan van der Walt, CC0)"
     ),
+    "cat": BuiltinPhotograph(
+        "chelsea.png", (0, 0, 451, 300), "The whole picture of that cat (Stefan van der Walt, CC0)"
+    ),
     "chelsea_cheek": BuiltinPhotograph(
         "chelsea.png", (143, 151, 64, 64), "The same cat's cheek (Stefan van der Walt, CC0)"
     ),

@@ -21,7 +21,14 @@ FUR_PHOTO = Schema(
             _PIXELS,
             "bool",
             "1",
-            "Where there is fur, in a cut-out; radiance is 0 where there is none",
+            "Where there is fur; missing where there is fur everywhere",
+            optional=True,
+        ),
+        "unevenness_before": Variable(
+            (),
+            "float64",
+            "1",
+            "Deviation of the logarithm of the light's slope that was taken out",
             optional=True,
         ),
         "depth": Variable(
@@ -64,6 +71,12 @@ ATTENUATION = Schema(
             "1",
             "Spearman correlation of darkness with the true depth",
             optional=True,
+        ),
+        "depth_rmse": Variable(
+            (), "float64", "thickness", "RMSE of the depth by Eq. 1", optional=True
+        ),
+        "depth_rmse_constant": Variable(
+            (), "float64", "thickness", "RMSE of the best constant depth", optional=True
         ),
     },
 )

@@ -24,6 +24,7 @@ from pipelines.photo_fur import (
     photograph_lie,
     shells,
     stage_view,
+    suitability,
 )
 from pipelines.photo_fur.laid_fur import LaidFur
 from pipelines.photo_fur.photograph import FurPhotograph
@@ -34,18 +35,26 @@ from tests.assets_defs.regressions import Regression, assert_check_finds, assert
 
 KEYS = {"photo": "grass", "mesh": "square"}
 PELT_KEYS = {"photo": "pelt", "mesh": "teapot"}
+CUT_KEYS = {"photo": "cut-png", "mesh": "square"}
 
 
 @pytest.fixture(scope="module")
 def good(house: Any) -> Any:
     """The house with the whole graph made once."""
-    for keys in (KEYS, PELT_KEYS):
+    random = np.random.default_rng(5)
+    codes = random.integers(30, 160, (80, 96, 4)).astype(np.uint8)
+    codes[..., 3] = 255
+    codes[:, :24] = (255, 255, 255, 0)
+    inbox = house.workspace.inbox("photo_fur")
+    inbox.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(codes).save(inbox / "cut.png")
+    for keys in (KEYS, PELT_KEYS, CUT_KEYS):
         house.launcher.launch(Request(FUR, [keys], preset="test"))
     return house
 
 
 def test_every_asset_is_current_and_has_passed_every_check(good: Any) -> None:
-    for keys in (KEYS, PELT_KEYS):
+    for keys in (KEYS, PELT_KEYS, CUT_KEYS):
         for plan in FUR.plans.values():
             slot = FUR.slot(plan.name, {name: keys[name] for name in plan.by})
             pointer = good.workspace.store.pointer(slot)
@@ -124,15 +133,7 @@ def test_the_plain_look_is_the_papers(good: Any) -> None:
 
 
 def test_a_cut_out_goes_through_the_whole_graph(good: Any) -> None:
-    """Its transparent part is bright: taken for fur, it would be the tips."""
-    random = np.random.default_rng(5)
-    codes = random.integers(30, 160, (80, 96, 4)).astype(np.uint8)
-    codes[..., 3] = 255
-    codes[:, :24] = (255, 255, 255, 0)
-    inbox = good.workspace.inbox("photo_fur")
-    inbox.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(codes).save(inbox / "cut.png")
-    good.launcher.launch(Request(FUR, [KEYS | {"photo": "cut-png"}], preset="test"))
+    """Its transparent part is white: taken for fur, it would be the tips."""
     store = good.workspace.store
     photo = store.open(Slot("photo_fur", "fur_photo", "cut-png"))
     opaque = np.broadcast_to(np.arange(96) >= 24, (80, 96))
@@ -140,7 +141,9 @@ def test_a_cut_out_goes_through_the_whole_graph(good: Any) -> None:
     assert not photo["radiance"].values[:, :24].any()
     medium = store.open(Slot("photo_fur", "attenuation", "cut-png"))
     assert int(medium["histogram"].sum()) == opaque.sum()
-    assert float(medium["brightest"]) < 0.4
+    seen = photo["luminance"].values[opaque]
+    expected = attenuation.fit_attenuation(seen, tail=0.005).with_ends_at((0.36, 1.04))
+    assert float(medium["brightest"]) == pytest.approx(expected.brightest, rel=1e-6)
     stack = store.open(Slot("photo_fur", "shell_stack", "cut-png"))
     np.testing.assert_array_equal(stack["layer"].values > 0, opaque)
     assert not stack["mask"].values[:, :, :24].any()
@@ -176,6 +179,17 @@ def test_one_setting_remakes_only_what_depends_on_it(good: Any) -> None:
 
 def _dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     return np.full_like(right(*arguments, **options), attenuation.DROPPED)
+
+
+def _hardly_any(right: Callable[..., Any], *arguments: Any) -> Any:
+    radiance, opaque = right(*arguments)
+    opaque[:, 30:] = False
+    return radiance, opaque
+
+
+def _left_lit(right: Callable[..., Any], radiance: Any, fur: Any) -> suitability.EvenlyLit:
+    slope = np.linspace(1.0, 0.3, radiance.shape[1], dtype=np.float32)[:, None]
+    return suitability.EvenlyLit(radiance * slope, 0.0)
 
 
 def _half_dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
@@ -242,6 +256,8 @@ REGRESSIONS = (
         lambda right, *photo: np.clip(right(*photo) * 6, 0, 1),
         KEYS,
     ),
+    Regression("fur_share", photograph, "fit_cutout", _hardly_any, CUT_KEYS),
+    Regression("unevenness", suitability, "evenly_lit", _left_lit, KEYS),
     Regression(
         "kept_share",
         attenuation,
@@ -257,6 +273,13 @@ REGRESSIONS = (
         KEYS,
     ),
     Regression("depth_rank_correlation", virtual_pelt, "make_pelt", _shuffled_pelt, PELT_KEYS),
+    Regression(
+        "depth_rmse_ratio",
+        attenuation.Attenuation,
+        "with_ends_at",
+        lambda right, self, ends: self,
+        PELT_KEYS,
+    ),
     Regression("partition_error", attenuation, "layer_masks", _doubled_masks, KEYS),
     Regression("interval_error", attenuation, "layer_of", _linear_layers, KEYS),
     Regression(

@@ -23,19 +23,24 @@ vec4 higherHair(vec4 shown, vec2 at, float weight, inout float height) {
   return texel;
 }
 
-// Kajiya and Kay's fibre with Goldman's backward lobe, over what it sends straight up under light
-// from straight above. All are unit vectors.
+// Kajiya and Kay's fibre with Goldman's backward lobe. All are unit vectors.
 float hairLight(vec3 tangent, vec3 light, vec3 view) {
   vec2 cosine = vec2(dot(tangent, light), dot(tangent, view));
   vec2 sine = sqrt(max(vec2(1e-4), 1.0 - cosine * cosine));
   float azimuth = (dot(light, view) - cosine.x * cosine.y) / (sine.x * sine.y);
-  return sine.x * (1.0 + 0.3 * clamp(azimuth, -1.0, 1.0));
+  return sine.x * (1.0 + 0.5 * clamp(azimuth, -1.0, 1.0));
 }
 
-// What the fur above a shell lets through, over what it lets through from straight above; cosine of
-// the light to the surface's normal, depth in lengths of attenuation.
-float shadow(float cosine, float depth) {
-  return exp(-depth * (1.0 / max(cosine, 0.2) - 1.0)) * smoothstep(-0.35, 0.25, cosine);
+// What a lamp sends to a hair at a depth in the fur, below its own tip, both in lengths of
+// attenuation, over what the photograph's light sent there. Along the view all that is seen is lit.
+float lampLight(vec3 tangent, vec3 light, vec3 view, vec3 up, float depth, float below) {
+  float cosine = dot(light, up), apart = acos(clamp(dot(light, view), -1.0, 1.0));
+  float aside = 1.0 - exp(-apart * apart / (HOT_SPOT * HOT_SPOT));
+  float slanted = min(SLANT * (1.0 / max(cosine, 0.05) - 1.0), MOST_SLANT);
+  float shadow = exp(-BELOW * below - aside * slanted * depth);
+  float facing = mix(1.0, smoothstep(-DUSK, DUSK, cosine), aside);
+  float fibre = hairLight(tangent, light, view) / max(0.4, hairLight(tangent, up, up));
+  return pow(fibre, FIBRE) * mix(1.0, ASIDE, aside) * shadow * facing;
 }
 
 // Of a highlight on a fibre; its light is reflected into a cone about the fibre.
@@ -50,15 +55,15 @@ vec3 surfaceColour() {
   vec4 texel = higherHair(vec4(0.0, 0.0, 0.0, 1.0), uvsOut.xy, weightsOut.x, height);
   texel = higherHair(texel, uvsOut.zw, weightsOut.y, height);
   texel = higherHair(texel, uvThirdOut, weightsOut.z, height);
-  vec4 hair = hairInLayer(texel, layerOut, CODE_STEPS, DECAY, true);
+  vec4 hair = hairInLayer(texel, layerOut, CODE_STEPS, 0.0, true);
   if (hair.a == 0.0) discard;
   vec3 up = normalize(outwardOut), view = vec3(0.0, 0.0, 1.0);
-  float over = 1.0 - layerOut / LAYERS, depth = DECAY * layerOut;
-  vec3 tangent = normalize(alongOut * (0.4 + 1.2 * over) + up);
-  float open = shadow(dot(lampOut, up), depth);
-  float lamps = HEADLIGHT * hairLight(tangent, view, view) * shadow(dot(view, up), depth)
-    + LAMP * hairLight(tangent, lampOut, view) * open;
-  float above = hairLight(tangent, up, up);
-  return hair.rgb * (SKY * (0.5 + 0.5 * over) + lamps / above)
-    + GLOSS * LAMP * open * over * glint(tangent, lampOut, view);
+  float own = floor(depthCode(texel.a) / CODE_STEPS) + 1.0;
+  float depth = DECAY * layerOut, below = DECAY * (layerOut - own);
+  vec3 tangent = normalize(alongOut * TILT + up);
+  float lamp = lampLight(tangent, lampOut, view, up, depth, below);
+  float lamps = HEADLIGHT * lampLight(tangent, view, view, up, depth, below) + LAMP * lamp;
+  float over = 1.0 - layerOut / LAYERS;
+  return hair.rgb * (SKY * exp(-BELOW * below) + lamps)
+    + GLOSS * LAMP * lamp * over * glint(tangent, lampOut, view);
 }

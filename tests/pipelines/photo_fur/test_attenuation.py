@@ -380,3 +380,15 @@ def test_a_photograph_of_one_luminance_is_refused(luminance: list[float], tail: 
     with pytest.raises(ValueError, match=message) as caught:
         fit_attenuation(np.array([luminance]), tail=tail)
     assert str(caught.value).count(". ") == 0
+
+
+@pytest.mark.parametrize("ends", [(0.36, 1.04), (0.0, 0.5), (-0.2, 1.3)])
+def test_a_medium_has_its_luminances_at_the_depths_that_are_given(
+    ends: tuple[float, float],
+) -> None:
+    read = Attenuation(0.7, 0.05)
+    medium = read.with_ends_at(ends)
+    found = medium.luminance_at(np.array(ends))
+    np.testing.assert_allclose(found, [0.7, 0.05], rtol=1e-12)
+    assert medium.luminance_at(np.array(1.0)) == pytest.approx(medium.darkest, rel=1e-12)
+    assert read.with_ends_at((0.0, 1.0)) == read

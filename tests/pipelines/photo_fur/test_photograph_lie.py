@@ -96,11 +96,23 @@ def test_pieces_lie_within_the_fur() -> None:
     piece = pieces_of(photograph_lie(grey, opaque), 0.15, opaque)
     x, y = piece.places.T
     assert len(x) > 3
-    assert x.min() >= (10 + 0.15 * SIZE) / SIZE
-    assert x.max() <= (70 - 0.15 * SIZE) / SIZE
-    assert y.min() >= (28 + 0.15 * SIZE) / SIZE
-    assert y.max() <= (108 - 0.15 * SIZE) / SIZE
+    rows, columns = np.mgrid[:SIZE, :SIZE]
+    for column, row in zip(x * SIZE, SIZE - y * SIZE, strict=True):
+        disc = np.hypot(columns + 0.5 - column, rows + 0.5 - row) < 0.15 * SIZE
+        assert opaque[disc].mean() > 0.7
+        assert disc.sum() > 0.98 * np.pi * (0.15 * SIZE) ** 2 - 20  # all in the photograph
     alone = pieces_of(photograph_lie(grey, opaque), 2.0, opaque)
     np.testing.assert_allclose(alone.places.mean(axis=0), [40 / SIZE, 68 / SIZE], atol=0.2)
     with pytest.raises(ValueError, match=r"no part of the photograph is fur; expected a disc"):
         pieces_of(photograph_lie(grey), 0.1, np.zeros(grey.shape, bool))
+
+
+def test_of_a_coat_of_many_colours_the_pieces_are_of_one() -> None:
+    grey, _ = pelt(0)
+    radiance = np.repeat(grey[..., None], 3, axis=2)
+    radiance[:, : SIZE // 4, 0] *= 3.0  # a red quarter
+    lie = photograph_lie(grey)
+    every, alike = pieces_of(lie, 0.08), pieces_of(lie, 0.08, None, radiance)
+    assert every.places[:, 0].min() < 0.2
+    assert alike.places[:, 0].min() > 0.25
+    assert 0.4 < len(alike.places) / len(every.places) < 0.65
