@@ -24,6 +24,10 @@ from storage.stored_version import StoredVersion
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipelines.photo_fur.laying import Piece
+    from pipelines.photo_fur.photograph_lie import PhotographLie
+    from pipelines.photo_fur.shells import ShellMesh
+
 
 # ---- lie_field -------------------------------------------------------------------------------
 
@@ -155,25 +159,44 @@ def fur_patches(
     settings: PatchSettings, fur_photo: xr.Dataset, shell_mesh: xr.Dataset, lie_field: xr.Dataset
 ) -> Result:
     """Lay the photograph over the mesh in patches, each turned along the lie."""
-    from pipelines.photo_fur.laying import REACH, lay_patches, least_spacing
-    from pipelines.photo_fur.photograph_lie import disc_radius, photograph_lie, pieces_of
+    from pipelines.photo_fur.laying import lay_patches
+    from pipelines.photo_fur.photograph_lie import photograph_lie
     from pipelines.photo_fur.shells import mesh_radius
 
-    mesh, opaque = shell_mesh_of(shell_mesh), opaque_of(fur_photo)
+    mesh = shell_mesh_of(shell_mesh)
     skin = mesh.vertices[-1].astype("float64")
     width = settings.photograph_width * mesh_radius(skin)
-    lie = photograph_lie(fur_photo["luminance"].values, opaque)
-    across = settings.patches_across or REACH / disc_radius(lie.direction.shape, opaque)
-    spacing = max(width / across, least_spacing(skin, mesh.triangles))
+    lie = photograph_lie(fur_photo["luminance"].values, opaque_of(fur_photo))
+    spacing = _spacing(settings, fur_photo, mesh, width)
     laying = lay_patches(
         skin,
         mesh.triangles,
         lie_field["tangents"].values.astype("float64"),
         mesh.normals,
-        pieces_of(lie, REACH * spacing / width, opaque, fur_photo["radiance"].values),
+        _pieces(fur_photo, lie, spacing / width),
         spacing=spacing,
         width=width,
         seed=settings.patch_seed,
     )
     shown = {"patches": len(laying.middles), "sign's skewness": lie.slant}
     return fur_patches_dataset(laying, lie, width), shown
+
+
+def _spacing(
+    settings: PatchSettings, fur_photo: xr.Dataset, mesh: ShellMesh, width: float
+) -> float:
+    """Between patches' middles on a mesh, in its units."""
+    from pipelines.photo_fur.laying import REACH, least_spacing
+    from pipelines.photo_fur.photograph_lie import disc_radius
+
+    radius = disc_radius(fur_photo["luminance"].shape, opaque_of(fur_photo))
+    across = settings.patches_across or REACH / radius
+    return max(width / across, least_spacing(mesh.vertices[-1].astype("float64"), mesh.triangles))
+
+
+def _pieces(fur_photo: xr.Dataset, lie: PhotographLie, spacing: float) -> Piece:
+    """Where patches may be taken from; spacing in photograph widths."""
+    from pipelines.photo_fur.laying import REACH
+    from pipelines.photo_fur.photograph_lie import pieces_of
+
+    return pieces_of(lie, REACH * spacing, opaque_of(fur_photo), fur_photo["radiance"].values)

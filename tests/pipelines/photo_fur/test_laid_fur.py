@@ -10,7 +10,7 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.stage import Stage, orbit
 from pipelines.geometry.shapes import sphere, square
 from pipelines.photo_fur import figures
-from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
+from pipelines.photo_fur.laid_fur import BEND, LaidFur, laid_surface
 from pipelines.photo_fur.laying import Laying, Piece, lay_patches
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.stage_view import FurLight, fur_texture
@@ -170,4 +170,4 @@ def test_reach_holds_all_that_is_drawn() -> None:
     mesh = sphere(8)
     laying = Laying(*(np.zeros(0, int) for _ in Laying._fields))  # type: ignore[arg-type]
     fur = LaidFur(mesh.vertices.astype(np.float32), mesh.normals, mesh.normals, laying, 0.1, 4)
-    assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * 1.8, abs=1e-5)
+    assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * (1 + BEND), abs=1e-5)
