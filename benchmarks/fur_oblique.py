@@ -36,7 +36,7 @@ from pipelines.virtual.pelt.coats import (
     oblique_view,
     photograph_coat,
 )
-from pipelines.virtual.pelt.hairs import FurKind, grow_hairs
+from pipelines.virtual.pelt.hairs import GOLDEN, FurKind, Hairs, grow_hairs
 from pipelines.virtual.pelt.pelt import exposed, photograph_hairs, white_of
 from pipelines.virtual.pelt.scattering import Source
 
@@ -65,9 +65,7 @@ def oblique_figures(kind: FurKind, seed: int, samples: int) -> dict[str, Any]:
     shuffled photograph in the full look; SSIM beside."""
     random = np.random.default_rng(seed)
     hairs = grow_hairs(_HAIRS, random, kind)
-    picture = photograph_hairs(hairs, _PHOTOGRAPH, 2 * samples, random)
-    white = white_of(picture.radiance)
-    radiance = exposed(picture.radiance, white)
+    radiance, white = _photographed(hairs, 2 * samples, random)
     pixels = radiance.reshape(-1, 3)
     shuffled = np.random.default_rng(0).permutation(pixels).reshape(radiance.shape)
     full = fur_photograph(radiance, ends=CALIBRATED_ENDS)
@@ -100,6 +98,30 @@ def oblique_figures(kind: FurKind, seed: int, samples: int) -> dict[str, Any]:
         "oblique_flip_each": flips[""],
         "oblique_flip_plain_each": flips["_plain"],
     }
+
+
+def oblique_pictures(seed: int, samples: int) -> list[list[NDArray[np.uint8]]]:
+    """Each body from 50 degrees, lit from aside: traced, in the full look, in the paper's."""
+    random = np.random.default_rng(seed)
+    hairs = grow_hairs(_HAIRS, random, GOLDEN)
+    radiance, white = _photographed(hairs, 2 * samples, random)
+    full, plain = fur_photograph(radiance, ends=CALIBRATED_ENDS), fur_photograph(radiance)
+    found = []
+    for body, azimuth in AZIMUTHS.items():
+        view = oblique_view(body, 50.0, azimuth)
+        scene = Scene(body, make_coat(hairs, body), view, _lamps()["aside"])
+        traced = _traced(scene, samples, white, random)
+        found.append([traced, _drawn_full(scene, full), _drawn_plain(scene, plain)])
+    return found
+
+
+def _photographed(
+    hairs: Hairs, samples: int, random: np.random.Generator
+) -> tuple[NDArray[np.floating], float]:
+    """A tile's exposed photograph from above, and the radiance that it shows as white."""
+    picture = photograph_hairs(hairs, _PHOTOGRAPH, samples, random)
+    white = white_of(picture.radiance)
+    return exposed(picture.radiance, white), white
 
 
 def _lamps() -> dict[str, tuple[float, float, float] | None]:

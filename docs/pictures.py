@@ -22,6 +22,7 @@ from assets_defs.street_billboards.graph import STREET
 from assets_defs.street_billboards.textures import TextureSettings, view_textures
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
+from benchmarks.fur_oblique import oblique_pictures
 from pipelines.drawing.colour import to_8bit
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
@@ -33,8 +34,8 @@ from storage.versions import VersionedStore
 FOLDER = Path(__file__).parent / "pictures"
 SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
     FUR: {
-        "photo": ("grass", "chelsea", "pelt"),
-        "mesh": ("square", "teapot", "teapot-large"),
+        "photo": ("grass", "cat", "pelt"),
+        "mesh": ("square", "animal"),
     },
     SCRATCHES: {
         "setting": SCRATCHES.dimension("setting").builtin,
@@ -54,7 +55,14 @@ _GAP = 10
 
 def make_pictures(store: VersionedStore) -> None:
     """Write every picture that the pages show."""
-    frames = {name: _frames(store, "teapot-large", name) for name in ("grass", "chelsea", "pelt")}
+    _fur(store)
+    _scratches(store)
+    _lighting(store)
+    _street(store)
+
+
+def _fur(store: VersionedStore) -> None:
+    frames = {name: _frames(store, "animal", name) for name in ("grass", "cat", "pelt")}
     _row(
         "fur.jpg",
         _shown(store, FUR, "fur_photo", {"photo": "pelt"}),
@@ -63,10 +71,11 @@ def make_pictures(store: VersionedStore) -> None:
     )
     _row("fur-square.jpg", *_frames(store, "square", "pelt"))
     _row("fur-three.jpg", *(pictures[0] for pictures in frames.values()))
+    _row("fur-animal.jpg", *frames["pelt"])
     _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
-    _scratches(store)
-    _lighting(store)
-    _street(store)
+    _row("fur-report.jpg", _shown(store, FUR, "fur_photo", {"photo": "cat"}))
+    rows = [np.hstack([column[k] for column in oblique_pictures(7, 16)]) for k in range(3)]
+    _row("fur-oblique.jpg", np.vstack(rows))
 
 
 def _lighting(store: VersionedStore) -> None:
