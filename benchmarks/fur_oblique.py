@@ -206,7 +206,9 @@ def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
     whole = np.arange(len(uvs), dtype=np.int64)
     laying = Laying(whole, skin.triangles, places, weights, shown, whole[:1])
     vertices = skin.vertices.astype(np.float32)
-    return LaidFur(vertices, _normals(skin), tangents, laying, coat.thickness, LAYERS)
+    return LaidFur(
+        vertices, _normals(skin), tangents, laying, np.full(len(uvs), coat.thickness), LAYERS
+    )
 
 
 def _normals(skin: Mesh) -> NDArray[np.floating]:

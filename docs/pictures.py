@@ -245,7 +245,7 @@ def make_assets() -> None:
             for system, keys in SHOWN.items()
         ]
         launched = launch_all(session, requests)
-    report(session, launched, as_json=False)
+    report(session, launched, [], as_json=False)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.drawing.colour import luminance
 from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
 from pipelines.photo_fur.figures import DepthFigures
-from pipelines.photo_fur.laid_fur import LaidFur
+from pipelines.photo_fur.laid_fur import Hair, LaidFur
 from pipelines.photo_fur.laying import Laying
 from pipelines.photo_fur.lie import LieField
 from pipelines.photo_fur.photograph import FurPhotograph
@@ -143,7 +143,11 @@ def shell_mesh_of(dataset: xr.Dataset) -> ShellMesh:
 
 
 def lie_field_dataset(
-    field: LieField, guides: NDArray[np.floating], backwards: NDArray[np.floating], name: str
+    field: LieField,
+    lengths: NDArray[np.floating],
+    guides: NDArray[np.floating],
+    backwards: NDArray[np.floating],
+    name: str,
 ) -> xr.Dataset:
     """`lie_field` of a mesh."""
     import numpy as np
@@ -152,6 +156,7 @@ def lie_field_dataset(
     return xr.Dataset(
         {
             "tangents": (("vertex", "axis"), field.tangents.astype(np.float32)),
+            "lengths": ("vertex", lengths.astype(np.float32)),
             "guides": (("vertex", "axis"), guides.astype(np.float32)),
             "singular_triangle": ("singularity", field.singular_triangles),
             "index": ("singularity", field.indices),
@@ -187,15 +192,20 @@ def laying_of(fur_patches: xr.Dataset) -> Laying:
     return Laying(*(fur_patches[name].values for name in Laying._fields))
 
 
+def hair_of(lie_field: xr.Dataset) -> Hair:
+    """How hair lies on a mesh, and how long it is."""
+    return Hair(lie_field["tangents"].values, lie_field["lengths"].values)
+
+
 def laid_fur_of(shell_mesh: xr.Dataset, lie_field: xr.Dataset, fur_patches: xr.Dataset) -> LaidFur:
     """The fur laid over the mesh, as it is drawn."""
-    mesh, laying = shell_mesh_of(shell_mesh), laying_of(fur_patches)
+    mesh, laying, hair = shell_mesh_of(shell_mesh), laying_of(fur_patches), hair_of(lie_field)
     return LaidFur(
         mesh.vertices[-1][laying.vertex],
         mesh.normals[laying.vertex],
-        lie_field["tangents"].values[laying.vertex],
+        hair.tangents[laying.vertex],
         laying,
-        mesh.thickness,
+        (mesh.thickness * hair.lengths)[laying.vertex],
         mesh.layers,
     )
 
@@ -218,8 +228,8 @@ LOADERS: dict[str, Callable[[StoredVersion], object]] = {
     "attenuation": lambda version: photograph_of(version.input("fur_photo"), version.dataset),
     "shell_stack": lambda version: shell_stack_of(version.dataset),
     "shell_mesh": lambda version: shell_mesh_of(version.dataset),
-    "lie_field": lambda version: version.dataset["tangents"].values,
+    "lie_field": lambda version: hair_of(version.dataset),
     "fur_patches": lambda version: laying_of(version.dataset),
 }
-"""What ``tsuya.load`` gives, by asset: the photograph with its medium, its layers, the mesh, how
-hair lies there (vertex, 3), and the photograph laid along it."""
+"""What ``tsuya.load`` gives, by asset: the photograph with its medium, its layers, the mesh, the
+hair there, and the photograph laid along it."""

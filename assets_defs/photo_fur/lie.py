@@ -46,6 +46,9 @@ class LieSettings(Settings):
     smoothness: float = Field(
         0.12, gt=0.0, le=10.0, description="Turns shorter than this are evened out, in mesh radii"
     )
+    even_length: bool = Field(
+        False, description="Hair as long everywhere; else shorter where the body is thin"
+    )
 
 
 def _guide_error(version: StoredVersion) -> float:
@@ -74,6 +77,7 @@ def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
     import numpy as np
 
     from pipelines.photo_fur import lie
+    from pipelines.photo_fur.hair_length import hair_lengths
     from pipelines.photo_fur.shells import mesh_radius
 
     mesh = shell_mesh_of(shell_mesh)
@@ -83,11 +87,14 @@ def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
     guides = lie.guides_backwards(mesh.normals, backwards, settings.gravity)
     smoothness = settings.smoothness * mesh_radius(skin)
     field = lie.lie_field(skin, mesh.normals, mesh.triangles, guides, smoothness)
+    even = settings.even_length
+    lengths = np.ones(len(skin)) if even else hair_lengths(skin, mesh.normals, mesh.triangles)
     shown = {
         "nose to tail": ", ".join(f"{part:.3g}" for part in backwards),
         "crowns and saddles": len(field.indices),
+        "shortest hair": float(lengths.min()),
     }
-    return lie_field_dataset(field, guides, backwards, shell_mesh.attrs["name"]), shown
+    return lie_field_dataset(field, lengths, guides, backwards, shell_mesh.attrs["name"]), shown
 
 
 # ---- fur_patches -----------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, code_steps
 from pipelines.photo_fur.laying import Laying
-from pipelines.photo_fur.stage_view import FurLight
+from pipelines.photo_fur.stage_view import FurLight, layers_with_hair
 
 BEND = 0.5
 """How far tips lean along the lie, in thicknesses."""
@@ -43,24 +43,33 @@ SHADING = {
 """How light falls on hair, fitted to a traced pelt that is in no figure."""
 
 
+class Hair(NamedTuple):
+    """How hair lies on a mesh, and how long it is, by vertex."""
+
+    tangents: NDArray[np.floating]
+    """(V, 3): unit vectors along the surface, towards the tips."""
+    lengths: NDArray[np.floating]
+    """(V,): 1 for the fur's thickness."""
+
+
 class LaidFur(NamedTuple):
     """A body with a photograph laid over it in patches.
 
-    Vertices are those of the laying: skin, normals and tangents (N, 3) float32, thickness in mesh
-    units.
+    Vertices are those of the laying: skin, normals and tangents (N, 3) float32; thickness (N,) of
+    the fur, in mesh units.
     """
 
     skin: NDArray[np.float32]
     normals: NDArray[np.floating]
     tangents: NDArray[np.floating]
     laying: Laying
-    thickness: float
+    thickness: NDArray[np.floating]
     layers: int
 
     @property
     def reach(self) -> NDArray[np.float32]:
         """(2 N, 3): the skin, and where the tips may be at the most."""
-        lifted = self.thickness * (self.normals + BEND * self.tangents)
+        lifted = self.thickness[:, None] * (self.normals + BEND * self.tangents)
         return np.concatenate([self.skin, self.skin + lifted]).astype(np.float32)
 
 
@@ -76,17 +85,19 @@ def laid_surface(
     wrap: what is beyond the photograph; of one that is a tile, "repeat".
     """
     layers, count = fur.layers, len(fur.skin)
+    drawn = layers_with_hair(image, layers)
     laying, uvs = fur.laying, texture_coordinates(fur.laying.uvs, image.shape[:2])
 
     def each(values: NDArray[np.floating]) -> NDArray[np.floating]:
-        return np.tile(values, (layers, 1))
+        return np.tile(values, (len(drawn), 1))
 
-    offsets = count * np.arange(layers)[:, None, None]
+    offsets = count * np.arange(len(drawn))[:, None, None]
     return surface(
         each(fur.skin),
         (laying.triangles[None] + offsets).reshape(-1, 3),
         attributes={
-            "layer": np.repeat(np.arange(1, layers + 1), count),
+            "layer": np.repeat(drawn, count),
+            "thickness": np.tile(fur.thickness, len(drawn)),
             "outward": each(fur.normals),
             "along": each(fur.tangents),
             "uvs": each(uvs[:, :2].reshape(count, 4)),
@@ -99,7 +110,6 @@ def laid_surface(
             "fur_laid_fragment.glsl",
             CODE_STEPS=float(code_steps(layers)),
             DECAY=attenuation.coefficient / layers,
-            THICKNESS=float(fur.thickness),
             LAYERS=float(layers),
             BEND=BEND,
             HEIGHT_OF_WEIGHT=HEIGHT_OF_WEIGHT,

@@ -61,6 +61,17 @@ def fur_texture(photograph: FurPhotograph, layers: int, *, tails: Tails) -> NDAr
     return np.dstack([colours, code])
 
 
+def layers_with_hair(image: NDArray[np.uint8], layers: int) -> NDArray[np.int64]:
+    """Numbers of the layers, from 1, down from the highest hair; image from ``fur_texture``.
+
+    >>> image = np.full((2, 2, 4), 130, np.uint8)
+    >>> layers_with_hair(image, 4).tolist()  # 63 codes a layer: 130 is in the third
+    [3, 4]
+    """
+    highest = min(int(image[..., 3].min()) // code_steps(layers), layers - 1)
+    return np.arange(highest + 1, layers + 1)
+
+
 def fur_surface(
     shells: NDArray[np.float32],
     normals: NDArray[np.floating],
@@ -80,13 +91,13 @@ def fur_surface(
     ``fur_texture`` for the same N. Lambert shading where ``lit`` (section 3, results).
     """
     layers, count, _ = shells.shape
-    numbers = np.repeat(np.arange(1, layers + 1), count)
-    offsets = count * np.arange(layers)[:, None, None]
+    drawn = layers_with_hair(image, layers)
+    offsets = count * np.arange(len(drawn))[:, None, None]
     return surface(
-        shells.reshape(-1, 3),
+        shells[drawn - 1].reshape(-1, 3),
         (triangles[None] + offsets).reshape(-1, 3),
-        normals=np.tile(normals, (layers, 1)),
-        attributes={"uv": np.tile(uvs, (layers, 1)), "layer": numbers},
+        normals=np.tile(normals, (len(drawn), 1)),
+        attributes={"uv": np.tile(uvs, (len(drawn), 1)), "layer": np.repeat(drawn, count)},
         textures={
             "photograph": texture(
                 image, wrap=wrap, interpolate=interpolate, mipmap=False, srgb=True
@@ -121,15 +132,15 @@ def live_surface(
     skin (V, 3), its normals (V, 3), triangles (F, 3), uvs (V, 2); image from ``fur_texture`` for
     the same number of layers; thickness in units of the mesh.
     """
-    count = len(skin)
-    offsets = count * np.arange(layers)[:, None, None]
+    count, drawn = len(skin), layers_with_hair(image, layers)
+    offsets = count * np.arange(len(drawn))[:, None, None]
     return surface(
-        np.tile(skin, (layers, 1)),
+        np.tile(skin, (len(drawn), 1)),
         (triangles[None] + offsets).reshape(-1, 3),
         attributes={
-            "uv": np.tile(uvs, (layers, 1)),
-            "outward": np.tile(normals, (layers, 1)),
-            "layer": np.repeat(np.arange(1, layers + 1), count),
+            "uv": np.tile(uvs, (len(drawn), 1)),
+            "outward": np.tile(normals, (len(drawn), 1)),
+            "layer": np.repeat(drawn, count),
         },
         textures={"photograph": texture(image, wrap="mirrored", srgb=True)},
         shader=surface_shader(

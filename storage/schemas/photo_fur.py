@@ -128,6 +128,9 @@ LIE_FIELD = Schema(
         "tangents": Variable(
             ("vertex", "axis"), "float32", "1", "Unit directions along the surface, to the tips"
         ),
+        "lengths": Variable(
+            ("vertex",), "float32", "1", "How long the hair is, 1 for the fur's thickness"
+        ),
         "guides": Variable(
             ("vertex", "axis"), "float32", "1", "Wanted directions; longer ones count for more"
         ),

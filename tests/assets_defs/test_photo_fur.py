@@ -85,13 +85,13 @@ def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
     photograph, mesh = load("attenuation", "pelt"), load("shell_mesh", "teapot")
     assert isinstance(photograph, FurPhotograph)
     assert isinstance(mesh, shells.ShellMesh)
-    field, patches = load("lie_field", "teapot"), load("fur_patches", "teapot.pelt")
+    hair, patches = load("lie_field", "teapot"), load("fur_patches", "teapot.pelt")
     laid = LaidFur(
         mesh.vertices[-1][patches.vertex],
         mesh.normals[patches.vertex],
-        field[patches.vertex],
+        hair.tangents[patches.vertex],
         patches,
-        mesh.thickness,
+        (mesh.thickness * hair.lengths)[patches.vertex],
         mesh.layers,
     )
     drawn = frames.draw_laid_frames(

@@ -3,6 +3,7 @@
 
 uniform mat4 MCVCMatrix;
 in float layer;
+in float thickness;
 in vec3 outward;
 in vec3 along;
 in vec4 uvs;
@@ -18,7 +19,7 @@ flat out vec3 lampOut;
 
 void placeVertex() {
   float height = 1.0 - layer / LAYERS;
-  vec3 lifted = THICKNESS * (height * outward + BEND * height * height * along);
+  vec3 lifted = thickness * (height * outward + BEND * height * height * along);
   gl_Position = MCDCMatrix * vec4(vertexMC.xyz + lifted, 1.0);
   uvsOut = uvs;
   uvThirdOut = uvThird;

@@ -112,7 +112,11 @@ _FUR_SHELL: dict[str, Any] = {
     "LAMP": 0.8,
     "LAMP_TOWARDS": [0.0, 0.6, 0.8],
 }
-_FUR_LAID: dict[str, Any] = {"BEND": 0.6, "HEIGHT_OF_WEIGHT": 0.5, "GLOSS": 0.1, **SHADING}
+_FUR_LAID: dict[str, Any] = {
+    **{name: value for name, value in _FUR_SHELL.items() if name != "THICKNESS"},
+    **{"BEND": 0.6, "HEIGHT_OF_WEIGHT": 0.5, "GLOSS": 0.1},
+    **SHADING,
+}
 _GRID: dict[str, Any] = {
     "GRID_START": [0.05, 0.02],
     "GRID_END": [1.0, 0.99],
@@ -135,7 +139,7 @@ STAGES: list[tuple[str, dict[str, Any]]] = [
     ),
     *(("fur", {"CODE_STEPS": 25.0, "DECAY": 0.3, "COLUMNS": columns}) for columns in (True, False)),
     *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
-    ("fur_laid", _FUR_SHELL | _FUR_LAID),
+    ("fur_laid", _FUR_LAID),
     ("scratched_glass", _GLASS),
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
     ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),

@@ -86,7 +86,14 @@ def drawn(light: FurLight, elevation: float, photo: FurPhotograph) -> NDArray[np
     points, laying = flat_laying(np.zeros(50))
     normals = np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1))
     tangents = np.tile(EAST, (len(laying.vertex), 1))
-    fur = LaidFur(points[laying.vertex].astype(np.float32), normals, tangents, laying, 0.05, LAYERS)
+    fur = LaidFur(
+        points[laying.vertex].astype(np.float32),
+        normals,
+        tangents,
+        laying,
+        np.full(len(laying.vertex), 0.05),
+        LAYERS,
+    )
     image = fur_texture(photo, LAYERS, tails="end layers")
     middle = tuple(points.mean(axis=0).tolist())
     with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
@@ -144,7 +151,7 @@ def test_a_photograph_that_is_not_square_is_not_drawn_out() -> None:
             np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1)),
             np.tile(EAST, (len(laying.vertex), 1)),
             laying,
-            0.05,
+            np.full(len(laying.vertex), 0.05),
             LAYERS,
         )
         photo = fur_photograph(np.tile(one, (*times, 1)))
@@ -169,5 +176,12 @@ def test_a_photograph_that_is_not_square_is_not_drawn_out() -> None:
 def test_reach_holds_all_that_is_drawn() -> None:
     mesh = sphere(8)
     laying = Laying(*(np.zeros(0, int) for _ in Laying._fields))  # type: ignore[arg-type]
-    fur = LaidFur(mesh.vertices.astype(np.float32), mesh.normals, mesh.normals, laying, 0.1, 4)
+    fur = LaidFur(
+        mesh.vertices.astype(np.float32),
+        mesh.normals,
+        mesh.normals,
+        laying,
+        np.full(len(mesh.vertices), 0.1),
+        4,
+    )
     assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * (1 + BEND), abs=1e-5)
