@@ -19,13 +19,19 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from assets_defs.workspace import CHECKOUT
+from benchmarks.fur_laying import laying_figures
 from benchmarks.fur_oblique import oblique_figures
 from benchmarks.fur_pelts import calibrated_ends, depth_figures, judged_pelts, segmentation_figures
 from pipelines.drawing.colour import decode_srgb, encode_srgb, luminance
 from pipelines.drawing.glsl import Shader
 from pipelines.drawing.stage import Light, Stage, orbit, surface, texture
 from pipelines.geometry import shapes
-from pipelines.photo_fur.attenuation import fit_attenuation, layer_of, make_shell_stack
+from pipelines.photo_fur.attenuation import (
+    CALIBRATED_ENDS,
+    fit_attenuation,
+    layer_of,
+    make_shell_stack,
+)
 from pipelines.photo_fur.figures import depth_rank_correlation, top_view_rmse
 from pipelines.photo_fur.frames import (
     BACKGROUND,
@@ -58,6 +64,7 @@ def run(scale: str) -> dict[str, Any]:
         ("from above", _top_view),
         ("depth on the virtual pelt", _depth),
         ("pelts never seen", lambda: _pelts(whole)),
+        ("laid over bodies", _laying),
         ("seen from aside", lambda: oblique_figures(GOLDEN, 7, 32 if whole else 8)),
         ("photograph to masks", _derive),
         ("frames against the usual shells", _frames),
@@ -133,6 +140,12 @@ def _pelts(whole: bool) -> dict[str, Any]:
     pelts = judged_pelts(4 if whole else 3, 64 if whole else 32)
     figures = depth_figures(pelts) | segmentation_figures(pelts)
     return figures | (calibrated_ends(64) if whole else {})
+
+
+def _laying() -> dict[str, Any]:
+    """Of the built-in pelt."""
+    pelt = make_pelt(PELT["size"], PELT["hairs"], PELT["samples"], 0)
+    return laying_figures(fur_photograph(pelt.radiance, ends=CALIBRATED_ENDS))
 
 
 def _derive() -> dict[str, Any]:

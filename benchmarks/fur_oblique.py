@@ -50,6 +50,13 @@ _SUPERSAMPLING = 3
 _DISTANCE = 20.0
 
 
+class Picture(NamedTuple):
+    """8-bit sRGB colours (y, x, 3) over the background, and the fur's share (y, x) of pixels."""
+
+    colours: NDArray[np.uint8]
+    share: NDArray[np.floating]
+
+
 class Scene(NamedTuple):
     """What is drawn, and how it is seen and lit."""
 
@@ -71,13 +78,14 @@ def oblique_figures(kind: FurKind, seed: int, samples: int) -> dict[str, Any]:
     full = fur_photograph(radiance, ends=CALIBRATED_ENDS)
     null = fur_photograph(shuffled, ends=CALIBRATED_ENDS)
     plain = fur_photograph(radiance)
-    looks: dict[str, Callable[[Scene], NDArray[np.uint8]]] = {
+    looks: dict[str, Callable[[Scene], Picture]] = {
         "": lambda scene: _drawn_full(scene, full),
         "_plain": lambda scene: _drawn_plain(scene, plain),
         "_null": lambda scene: _drawn_full(scene, null),
     }
     flips: dict[str, dict[str, float]] = {name: {} for name in looks}
     ssims: dict[str, list[float]] = {name: [] for name in looks}
+    rough: dict[str, list[float]] = {name: [] for name in (*looks, "_traced")}
     for body, azimuth in AZIMUTHS.items():
         coat = make_coat(hairs, body)
         for polar in POLARS:
@@ -85,16 +93,22 @@ def oblique_figures(kind: FurKind, seed: int, samples: int) -> dict[str, Any]:
             for name, lamp in _lamps().items():
                 scene = Scene(body, coat, view, lamp)
                 truth = _traced(scene, samples, white, random)
-                for look, draw in looks.items():
-                    drawn = draw(scene)
-                    flips[look][f"{body} {polar} {name}"] = float(flip_map(drawn, truth).mean())
-                    ssims[look].append(float(ssim_map(drawn, truth).mean()))
+                pictures = {look: draw(scene) for look, draw in looks.items()}
+                for look, drawn in pictures.items():
+                    flip = flip_map(drawn.colours, truth.colours)
+                    flips[look][f"{body} {polar} {name}"] = float(flip.mean())
+                    ssims[look].append(float(ssim_map(drawn.colours, truth.colours).mean()))
+                if body == "sphere":
+                    for look, picture in (pictures | {"_traced": truth}).items():
+                        rough[look].append(outline_roughness(picture.share))
+    roughness = {name: float(np.mean(each)) for name, each in rough.items()}
     means = {name: float(np.mean(list(each.values()))) for name, each in flips.items()}
     return {
         "oblique_flip_ratio": means[""] / means["_plain"],
         "oblique_flip_ratio_null": means["_null"] / means["_plain"],
         **{f"oblique_flip{name}": mean for name, mean in means.items()},
         **{f"oblique_ssim{name}": float(np.mean(each)) for name, each in ssims.items()},
+        **{f"silhouette_hairiness{name}": roughness[name] / roughness["_traced"] for name in looks},
         "oblique_flip_each": flips[""],
         "oblique_flip_plain_each": flips["_plain"],
     }
@@ -111,7 +125,8 @@ def oblique_pictures(seed: int, samples: int) -> list[list[NDArray[np.uint8]]]:
         view = oblique_view(body, 50.0, azimuth)
         scene = Scene(body, make_coat(hairs, body), view, _lamps()["aside"])
         traced = _traced(scene, samples, white, random)
-        found.append([traced, _drawn_full(scene, full), _drawn_plain(scene, plain)])
+        pictures = (traced, _drawn_full(scene, full), _drawn_plain(scene, plain))
+        found.append([picture.colours for picture in pictures])
     return found
 
 
@@ -137,23 +152,35 @@ def _towards(azimuth: float, polar: float) -> tuple[float, float, float]:
     )
 
 
-def _traced(
-    scene: Scene, samples: int, white: float, random: np.random.Generator
-) -> NDArray[np.uint8]:
+def outline_roughness(share: NDArray[np.floating]) -> float:
+    """Deviation in pixels of a ball's outline from its own mean over 15 degrees; share (y, x)."""
+    from scipy.ndimage import map_coordinates, uniform_filter1d
+
+    rows, columns = np.nonzero(share >= 0.5)
+    row, column = rows.mean(), columns.mean()
+    angle = np.radians(np.arange(0, 360, 0.5))[:, None]
+    radius = np.arange(0.0, min(share.shape) / 2 - 1, 0.25)[None]
+    there = [row - radius * np.sin(angle), column + radius * np.cos(angle)]
+    inside = map_coordinates(share, there, order=1) >= 0.5
+    outline = radius[0][inside.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)]
+    return float((outline - uniform_filter1d(outline, 30, mode="wrap")).std())
+
+
+def _traced(scene: Scene, samples: int, white: float, random: np.random.Generator) -> Picture:
     source = Source(scene.lamp or scene.view.towards, _LAMP_EXPONENT)
     radiance, share = photograph_coat(scene.coat, scene.view, SIZE, samples, source, random)
     behind = (1 - share[..., None]) * np.array(BACKGROUND)
-    return to_8bit(np.minimum(radiance / white + behind, 1.0))
+    return Picture(to_8bit(np.minimum(radiance / white + behind, 1.0)), share)
 
 
-def _drawn_full(scene: Scene, photograph: FurPhotograph) -> NDArray[np.uint8]:
+def _drawn_full(scene: Scene, photograph: FurPhotograph) -> Picture:
     fur = repeated_over(scene.body, scene.coat, photograph)
     image = fur_texture(photograph, LAYERS, tails="end layers")
     light = FurLight() if scene.lamp is None else FurLight(0.0, 0.0, 1.0, scene.lamp)
     return _seen(scene, laid_surface(fur, image, photograph.attenuation, light, wrap="repeat"))
 
 
-def _drawn_plain(scene: Scene, photograph: FurPhotograph) -> NDArray[np.uint8]:
+def _drawn_plain(scene: Scene, photograph: FurPhotograph) -> Picture:
     skin = scene.coat.skin
     image = fur_texture(photograph, LAYERS, tails="end layers")
     shells = shell_vertices(skin.vertices, _normals(skin), scene.coat.thickness, LAYERS)
@@ -172,7 +199,7 @@ def _drawn_plain(scene: Scene, photograph: FurPhotograph) -> NDArray[np.uint8]:
     return _seen(scene, actor)
 
 
-def _seen(scene: Scene, actor: Any) -> NDArray[np.uint8]:
+def _seen(scene: Scene, actor: Any) -> Picture:
     height, width = SIZE
     view = scene.view
     middle = np.asarray(view.middle)
@@ -181,7 +208,8 @@ def _seen(scene: Scene, actor: Any) -> NDArray[np.uint8]:
         stage.add(actor)
         stage.light(Light() if scene.lamp is None else Light(scene.lamp))
         stage.look(Camera(tuple(eye), tuple(middle), view.up, 30.0, view.height))
-        return stage.frame()
+        drawn = stage.radiance()
+    return Picture(to_8bit(drawn[..., :3]), drawn[..., 3])
 
 
 def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
