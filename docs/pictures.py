@@ -74,8 +74,8 @@ def _fur(store: VersionedStore) -> None:
     _row("fur-animal.jpg", *frames["pelt"])
     _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
     _row("fur-report.jpg", _shown(store, FUR, "fur_photo", {"photo": "cat"}))
-    rows = [np.hstack([column[k] for column in oblique_pictures(7, 16)]) for k in range(3)]
-    _row("fur-oblique.jpg", np.vstack(rows))
+    columns = [np.vstack(pictures) for pictures in oblique_pictures(7, 16)]
+    Image.fromarray(np.hstack(columns)).save(FOLDER / "fur-oblique.jpg", quality=88)
 
 
 def _lighting(store: VersionedStore) -> None:
