@@ -3,13 +3,16 @@ equally wide, and does it lie as the field says? Each beside the paper's texture
 
 from __future__ import annotations
 
+import random
+import statistics
+import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import decode_srgb, luminance
-from pipelines.drawing.stage import Camera, Light, Stage
+from pipelines.drawing.stage import Camera, Light, Stage, orbit
 from pipelines.geometry.eared_body import eared_body
 from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import square
@@ -26,7 +29,7 @@ from pipelines.photo_fur.photograph_lie import (
     pieces_of,
 )
 from pipelines.photo_fur.shells import mesh_radius
-from pipelines.photo_fur.stage_view import FurLight, fur_texture
+from pipelines.photo_fur.stage_view import FurLight, fur_texture, live_surface
 
 _LAYERS = 15
 _WIDTHS = 3.0
@@ -34,6 +37,7 @@ _WIDTHS = 3.0
 _PICTURE = 768
 _FAR = 0.2
 """Photograph widths from which on likeness is repetition."""
+_WINDOW, _TURNS = (640, 480), 21
 _HARD = 50.0
 """Of a patch's hairs, how much taller its middle is where borders are cuts: the null."""
 
@@ -87,12 +91,64 @@ def _body(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
     )
     layings = {"": laying, "_plain": _by_coordinates(body)}
     found: dict[str, Any] = {"patches": len(laying.middles)}
+    found |= _frame_ratio(photograph, body, tangents, laying)
     for name, each in layings.items():
         found[f"strand_scale_spread{name}"] = strand_scale_spread(points, each)
         found[f"lie_error_deg{name}"] = laid_lie_error(
             points, tangents, each, lie.direction, lie.coherence
         )
     return found
+
+
+def _frame_ratio(
+    photograph: FurPhotograph, body: Mesh, tangents: NDArray[np.floating], laying: Laying
+) -> dict[str, Any]:
+    """Frames of the full look over the plain one's, medians of turns on one stage, both with their
+    lamps in the shader; and by how much more vertices the full look has."""
+    thickness = 0.06 * mesh_radius(body.vertices)
+    image = fur_texture(photograph, _LAYERS, tails="end layers")
+    light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=(0.0, -0.6, 0.8))
+    plain = live_surface(
+        body.vertices.astype(np.float32),
+        body.normals,
+        body.triangles,
+        _coordinates(body),
+        image,
+        photograph.attenuation,
+        layers=_LAYERS,
+        thickness=thickness,
+        fill="columns",
+        light=light,
+    )
+    at = laying.vertex
+    fur = LaidFur(
+        body.vertices[at].astype(np.float32),
+        body.normals[at],
+        tangents[at],
+        laying,
+        np.full(len(at), thickness),
+        _LAYERS,
+    )
+    full = laid_surface(fur, image, photograph.attenuation, light)
+    with Stage(*_WINDOW, background=(0.1, 0.1, 0.1)) as stage:
+        stage.add(plain, full)
+        stage.light(Light())
+        stage.look(orbit((0.0, 0.0, 0.0), 5.0, -60.0, 15.0))
+        spent: dict[str, list[float]] = {"full": [], "plain": []}
+        for turn in range(_TURNS + 1):
+            for name in random.Random(turn).sample(sorted(spent), 2):
+                full.SetVisibility(name == "full")
+                plain.SetVisibility(name == "plain")
+                started = time.perf_counter()
+                stage.draw()
+                if turn:
+                    spent[name].append(time.perf_counter() - started)
+    medians = {name: statistics.median(each) for name, each in spent.items()}
+    return {
+        "full_frame_ratio": medians["full"] / medians["plain"],
+        "full_frame_ms": 1000 * medians["full"],
+        "full_vertices_ratio": len(at) / len(body.vertices),
+    }
 
 
 def repetition(grey: NDArray[np.floating]) -> float:
@@ -124,16 +180,20 @@ def seam_ratio(grey: NDArray[np.floating], borders: NDArray[np.bool_]) -> float:
 
 def _by_coordinates(mesh: Mesh) -> Laying:
     """The photograph by a mesh's own texture coordinates, in one patch."""
-    assert mesh.uvs is not None
     count = len(mesh.vertices)
     places = np.zeros((count, SLOTS, 2), np.float32)
-    places[:, 0] = mesh.uvs
+    places[:, 0] = _coordinates(mesh)
     weights = np.zeros((count, SLOTS), np.float32)
     weights[:, 0] = 1.0
     shown = np.full((len(mesh.triangles), SLOTS), -1, np.int64)
     shown[:, 0] = 0
     triangles = mesh.triangles.astype(np.int32)
     return Laying(np.arange(count), triangles, places, weights, shown, np.zeros(1, np.int64))
+
+
+def _coordinates(mesh: Mesh) -> NDArray[np.floating]:
+    assert mesh.uvs is not None
+    return mesh.uvs
 
 
 def _from_above(
