@@ -52,8 +52,7 @@ class AttenuationSettings(Settings):
     def _deeper(cls, ends: tuple[float, float]) -> tuple[float, float]:
         if not ends[1] - ends[0] >= _LEAST_DEPTH:
             raise ValueError(
-                f"ends is {ends[0]:g}, {ends[1]:g}; expected the darkest pixels at least "
-                f"{_LEAST_DEPTH:g} deeper than the brightest."
+                f"expected the darkest pixels at least {_LEAST_DEPTH:g} deeper than the brightest"
             )
         return ends
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from assets_defs.checks import Check
 from assets_defs.photo_fur.datasets import (
@@ -22,7 +22,9 @@ from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
+    from numpy.typing import NDArray
 
     from pipelines.photo_fur.laying import Piece
     from pipelines.photo_fur.photograph_lie import PhotographLie
@@ -46,9 +48,25 @@ class LieSettings(Settings):
     smoothness: float = Field(
         0.12, gt=0.0, le=10.0, description="Turns shorter than this are evened out, in mesh radii"
     )
+    strokes: str = Field(
+        "",
+        description="Lines on the mesh along which hair lies, from root to tip: points x,y,z in "
+        "mesh units, z up, with spaces between them and semicolons between lines",
+    )
+    stroke_reach: float = Field(
+        0.15, gt=0.0, le=10.0, description="How far from a stroke hair follows it, in mesh radii"
+    )
     even_length: bool = Field(
         False, description="Hair as long everywhere; else shorter where the body is thin"
     )
+
+    @field_validator("strokes")
+    @classmethod
+    def _lines(cls, strokes: str) -> str:
+        from pipelines.photo_fur.strokes import strokes_of
+
+        strokes_of(strokes)
+        return strokes
 
 
 def _guide_error(version: StoredVersion) -> float:
@@ -73,7 +91,7 @@ def _guide_error(version: StoredVersion) -> float:
     ),
 )
 def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
-    """The smoothest field of directions that heeds nose, tail and gravity."""
+    """The smoothest field of directions that heeds nose, tail, gravity and strokes."""
     import numpy as np
 
     from pipelines.photo_fur import lie
@@ -81,11 +99,11 @@ def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
     from pipelines.photo_fur.shells import mesh_radius
 
     mesh = shell_mesh_of(shell_mesh)
-    skin = mesh.vertices[-1]
+    skin, radius = mesh.vertices[-1], mesh_radius(mesh.vertices[-1])
     given = settings.backwards
     backwards = lie.nose_to_tail(skin) if given is None else np.array(given)
-    guides = lie.guides_backwards(mesh.normals, backwards, settings.gravity)
-    smoothness = settings.smoothness * mesh_radius(skin)
+    guides = _guides(settings, mesh, backwards)
+    smoothness = settings.smoothness * radius
     field = lie.lie_field(skin, mesh.normals, mesh.triangles, guides, smoothness)
     even = settings.even_length
     lengths = np.ones(len(skin)) if even else hair_lengths(skin, mesh.normals, mesh.triangles)
@@ -95,6 +113,20 @@ def lie_field(settings: LieSettings, shell_mesh: xr.Dataset) -> Result:
         "shortest hair": float(lengths.min()),
     }
     return lie_field_dataset(field, lengths, guides, backwards, shell_mesh.attrs["name"]), shown
+
+
+def _guides(
+    settings: LieSettings, mesh: ShellMesh, backwards: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Wanted directions, by vertex."""
+    from pipelines.photo_fur.lie import guides_backwards
+    from pipelines.photo_fur.shells import mesh_radius
+    from pipelines.photo_fur.strokes import guides_along, strokes_of
+
+    skin = mesh.vertices[-1]
+    others = guides_backwards(mesh.normals, backwards, settings.gravity)
+    reach = settings.stroke_reach * mesh_radius(skin)
+    return guides_along(strokes_of(settings.strokes), reach, skin, others)
 
 
 # ---- fur_patches -----------------------------------------------------------------------------
