@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 
 _LEAST_DEPTH = 0.05
+"""Between the ends of the histogram, in thicknesses."""
 
 # ---- attenuation -----------------------------------------------------------------------------
 
