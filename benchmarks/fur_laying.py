@@ -59,7 +59,7 @@ def _sheet(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
     )
     drawn = _from_above(photograph, points, east, laying)
     tiled = Mesh(points, flat.triangles, points[:, :2] + _WIDTHS / 2, flat.normals)
-    plain = _from_above(photograph, points, east, _by_coordinates(tiled))
+    plain = _from_above(photograph, points, east, laid_by_coordinates(tiled))
     blend = laid_fur.HEIGHT_OF_WEIGHT
     try:
         laid_fur.HEIGHT_OF_WEIGHT = _HARD
@@ -89,7 +89,7 @@ def _body(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
     laying = lay_patches(
         points, body.triangles, tangents, body.normals, pieces, spacing=spacing, width=width
     )
-    layings = {"": laying, "_plain": _by_coordinates(body)}
+    layings = {"": laying, "_plain": laid_by_coordinates(body)}
     found: dict[str, Any] = {"patches": len(laying.middles)}
     found |= _frame_ratio(photograph, body, tangents, laying)
     for name, each in layings.items():
@@ -112,7 +112,7 @@ def _frame_ratio(
         body.vertices.astype(np.float32),
         body.normals,
         body.triangles,
-        _coordinates(body),
+        coordinates_of(body),
         image,
         photograph.attenuation,
         layers=_LAYERS,
@@ -178,11 +178,11 @@ def seam_ratio(grey: NDArray[np.floating], borders: NDArray[np.bool_]) -> float:
     return float(steps[borders].mean() / steps[~borders].mean())
 
 
-def _by_coordinates(mesh: Mesh) -> Laying:
+def laid_by_coordinates(mesh: Mesh) -> Laying:
     """The photograph by a mesh's own texture coordinates, in one patch."""
     count = len(mesh.vertices)
     places = np.zeros((count, SLOTS, 2), np.float32)
-    places[:, 0] = _coordinates(mesh)
+    places[:, 0] = coordinates_of(mesh)
     weights = np.zeros((count, SLOTS), np.float32)
     weights[:, 0] = 1.0
     shown = np.full((len(mesh.triangles), SLOTS), -1, np.int64)
@@ -191,7 +191,8 @@ def _by_coordinates(mesh: Mesh) -> Laying:
     return Laying(np.arange(count), triangles, places, weights, shown, np.zeros(1, np.int64))
 
 
-def _coordinates(mesh: Mesh) -> NDArray[np.floating]:
+def coordinates_of(mesh: Mesh) -> NDArray[np.floating]:
+    """Texture coordinates (V, 2) of a mesh that has them."""
     assert mesh.uvs is not None
     return mesh.uvs
 

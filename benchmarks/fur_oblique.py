@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.fur_laying import coordinates_of, laid_by_coordinates
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.picture_metrics import flip_map, ssim_map
 from pipelines.drawing.stage import Camera, Light, Stage
@@ -22,7 +23,6 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur.attenuation import CALIBRATED_ENDS
 from pipelines.photo_fur.frames import BACKGROUND
 from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
-from pipelines.photo_fur.laying import SLOTS, Laying
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.photograph_lie import photograph_lie
 from pipelines.photo_fur.shells import shell_vertices
@@ -188,7 +188,7 @@ def _drawn_plain(scene: Scene, photograph: FurPhotograph) -> Picture:
         shells,
         _normals(skin),
         skin.triangles,
-        _uvs(skin),
+        coordinates_of(skin),
         image,
         photograph.attenuation,
         fill="bands",
@@ -215,7 +215,7 @@ def _seen(scene: Scene, actor: Any) -> Picture:
 def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
     """A tile's photograph on a body by its texture coordinates, in one patch, with the lie that is
     seen in it."""
-    skin, uvs = coat.skin, _uvs(coat.skin)
+    skin, uvs = coat.skin, coordinates_of(coat.skin)
     direction = photograph_lie(photograph.luminance).direction
     height, width = direction.shape
     columns = np.floor(uvs[:, 0] * width).astype(int) % width
@@ -225,14 +225,7 @@ def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
     step = 1e-3 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
     tangents = bent(flat + step, body) - bent(flat, body)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    places = np.zeros((len(uvs), SLOTS, 2), np.float32)
-    places[:, 0] = uvs
-    weights = np.zeros((len(uvs), SLOTS), np.float32)
-    weights[:, 0] = 1.0
-    shown = np.full((len(skin.triangles), SLOTS), -1, np.int64)
-    shown[:, 0] = 0
-    whole = np.arange(len(uvs), dtype=np.int64)
-    laying = Laying(whole, skin.triangles, places, weights, shown, whole[:1])
+    laying = laid_by_coordinates(skin)
     vertices = skin.vertices.astype(np.float32)
     return LaidFur(
         vertices, _normals(skin), tangents, laying, np.full(len(uvs), coat.thickness), LAYERS
@@ -242,8 +235,3 @@ def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
 def _normals(skin: Mesh) -> NDArray[np.floating]:
     assert skin.normals is not None
     return skin.normals
-
-
-def _uvs(skin: Mesh) -> NDArray[np.floating]:
-    assert skin.uvs is not None
-    return skin.uvs

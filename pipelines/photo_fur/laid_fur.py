@@ -40,7 +40,7 @@ SHADING = {
     "FIBRE": 0.5,  # power of the fibre's light
     "TILT": 2.0,  # of hair, tangent of the angle from upright
 }
-"""How light falls on hair, fitted to a traced pelt that is in no figure."""
+"""How light falls on hair, fitted to a traced pelt that no figure is of."""
 
 
 class Hair(NamedTuple):

@@ -73,19 +73,19 @@ def separation(looks: NDArray[np.floating], mask: NDArray[np.bool_]) -> float:
 def largest_square(mask: NDArray[np.bool_]) -> tuple[int, int, int]:
     """Left, top and side of the largest square of a mask (y, x) that holds nothing else.
 
-    >>> largest_square(np.array([[1, 1, 0, 0], [1, 1, 1, 1], [0, 1, 1, 1]], bool))
-    (0, 0, 2)
+    The side is odd, and 0 where the mask is empty.
+
+    >>> largest_square(np.array([[1, 1, 1, 0], [1, 1, 1, 1], [1, 1, 1, 1]], bool))
+    (0, 0, 3)
     """
-    side = np.zeros(mask.shape[1] + 1, np.int64)
-    best, place = 0, (0, 0)
-    for row, shown in enumerate(mask):
-        above = side.copy()
-        side[1:][~shown] = 0
-        for column in np.flatnonzero(shown):
-            side[column + 1] = 1 + min(above[column], above[column + 1], side[column])
-        if side.max() > best:
-            best, place = int(side.max()), (int(side.argmax()), row + 1)
-    return place[0] - best, place[1] - best, best
+    from scipy.ndimage import distance_transform_cdt
+
+    reach = distance_transform_cdt(np.pad(mask, 1), "chessboard")[1:-1, 1:-1]
+    row, column = np.unravel_index(int(reach.argmax()), mask.shape)
+    half = int(reach[row, column])
+    if half == 0:
+        return 0, 0, 0
+    return int(column) - half + 1, int(row) - half + 1, 2 * half - 1
 
 
 def _looks(radiance: NDArray[np.floating]) -> NDArray[np.float64]:

