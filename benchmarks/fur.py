@@ -37,7 +37,7 @@ from pipelines.photo_fur.frames import (
     BACKGROUND,
     SQUARE_VIEWS,
     draw_frames,
-    stretched_to_photograph,
+    stretched,
 )
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh
@@ -112,7 +112,7 @@ def _from_above(photo: FurPhotograph) -> float:
     height, width = photo.luminance.shape
     drawn = draw_frames(
         photo,
-        stretched_to_photograph(mesh, photo),
+        stretched(mesh, width / height),
         SQUARE_VIEWS[:1],
         size=(height, width),
         supersampling=1,

@@ -18,8 +18,16 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import square
 from pipelines.photo_fur import laid_fur
 from pipelines.photo_fur.figures import laid_lie_error, strand_scale_spread
-from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
-from pipelines.photo_fur.laying import REACH, SLOTS, Laying, lay_patches, least_spacing
+from pipelines.photo_fur.laid_fur import Hair, laid_surface
+from pipelines.photo_fur.laying import (
+    REACH,
+    SLOTS,
+    Body,
+    Laying,
+    choose_patches,
+    lay,
+    least_spacing,
+)
 from pipelines.photo_fur.lie import guides_backwards, lie_field, nose_to_tail
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.photograph_lie import (
@@ -54,9 +62,9 @@ def _sheet(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
     east = np.tile([1.0, 0.0, 0.0], (len(points), 1))
     spacing = disc_radius(lie.direction.shape) / REACH
     pieces = pieces_of(lie, REACH * spacing, None, photograph.radiance)
-    laying = lay_patches(
-        points, flat.triangles, east, flat.normals, pieces, spacing=spacing, width=1.0
-    )
+    sheet = Body(points, flat.triangles, east, flat.normals)
+    patches = choose_patches(sheet, pieces, spacing=spacing)
+    laying = lay(sheet, patches, spacing=spacing, width=1.0)
     drawn = _from_above(photograph, points, east, laying)
     tiled = Mesh(points, flat.triangles, points[:, :2] + _WIDTHS / 2, flat.normals)
     plain = _from_above(photograph, points, east, laid_by_coordinates(tiled))
@@ -86,11 +94,11 @@ def _body(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
         disc_radius(lie.direction.shape) / REACH * width, least_spacing(points, body.triangles)
     )
     pieces = pieces_of(lie, REACH * spacing / width, None, photograph.radiance)
-    laying = lay_patches(
-        points, body.triangles, tangents, body.normals, pieces, spacing=spacing, width=width
-    )
+    haired = Body(points, body.triangles, tangents, body.normals)
+    patches = choose_patches(haired, pieces, spacing=spacing)
+    laying = lay(haired, patches, spacing=spacing, width=width)
     layings = {"": laying, "_plain": laid_by_coordinates(body)}
-    found: dict[str, Any] = {"patches": len(laying.middles)}
+    found: dict[str, Any] = {"patches": len(patches.middles)}
     found |= _frame_ratio(photograph, body, tangents, laying)
     for name, each in layings.items():
         found[f"strand_scale_spread{name}"] = strand_scale_spread(points, each)
@@ -120,15 +128,8 @@ def _frame_ratio(
         fill="columns",
         light=light,
     )
-    at = laying.vertex
-    fur = LaidFur(
-        body.vertices[at].astype(np.float32),
-        body.normals[at],
-        tangents[at],
-        laying,
-        np.full(len(at), thickness),
-        _LAYERS,
-    )
+    hair = Hair(tangents, np.ones(len(tangents)))
+    fur = laid_fur.laid_fur(body.vertices, body.normals, hair, laying, thickness, _LAYERS)
     full = laid_surface(fur, image, photograph.attenuation, light)
     with Stage(*_WINDOW, background=(0.1, 0.1, 0.1)) as stage:
         stage.add(plain, full)
@@ -147,7 +148,7 @@ def _frame_ratio(
     return {
         "full_frame_ratio": medians["full"] / medians["plain"],
         "full_frame_ms": 1000 * medians["full"],
-        "full_vertices_ratio": len(at) / len(body.vertices),
+        "full_vertices_ratio": len(laying.vertex) / len(body.vertices),
     }
 
 
@@ -188,7 +189,7 @@ def laid_by_coordinates(mesh: Mesh) -> Laying:
     shown = np.full((len(mesh.triangles), SLOTS), -1, np.int64)
     shown[:, 0] = 0
     triangles = mesh.triangles.astype(np.int32)
-    return Laying(np.arange(count), triangles, places, weights, shown, np.zeros(1, np.int64))
+    return Laying(np.arange(count), triangles, places, weights, shown)
 
 
 def coordinates_of(mesh: Mesh) -> NDArray[np.floating]:
@@ -204,14 +205,9 @@ def _from_above(
     laying: Laying,
 ) -> NDArray[np.floating]:
     """Luminance (y, x) of the sheet from straight above, as it was photographed."""
-    fur = LaidFur(
-        points[laying.vertex].astype(np.float32),
-        np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1)),
-        tangents[laying.vertex],
-        laying,
-        np.full(len(laying.vertex), 1e-3),
-        _LAYERS,
-    )
+    upright = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    hair = Hair(tangents, np.ones(len(points)))
+    fur = laid_fur.laid_fur(points, upright, hair, laying, 1e-3, _LAYERS)
     image = fur_texture(photograph, _LAYERS, tails="end layers")
     light = FurLight(sky=1.0, headlight=0.0)
     black = (0.0, 0.0, 0.0)

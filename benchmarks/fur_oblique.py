@@ -22,7 +22,7 @@ from pipelines.drawing.stage import Camera, Light, Stage
 from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur.attenuation import CALIBRATED_ENDS
 from pipelines.photo_fur.frames import BACKGROUND
-from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
+from pipelines.photo_fur.laid_fur import Hair, LaidFur, laid_fur, laid_surface
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.photograph_lie import photograph_lie
 from pipelines.photo_fur.shells import shell_vertices
@@ -226,10 +226,8 @@ def repeated_over(body: Body, coat: Coat, photograph: FurPhotograph) -> LaidFur:
     tangents = bent(flat + step, body) - bent(flat, body)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     laying = laid_by_coordinates(skin)
-    vertices = skin.vertices.astype(np.float32)
-    return LaidFur(
-        vertices, _normals(skin), tangents, laying, np.full(len(uvs), coat.thickness), LAYERS
-    )
+    hair = Hair(tangents, np.ones(len(uvs)))
+    return laid_fur(skin.vertices, _normals(skin), hair, laying, coat.thickness, LAYERS)
 
 
 def _normals(skin: Mesh) -> NDArray[np.floating]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from pipelines.drawing.colour import luminance
 from pipelines.photo_fur.attenuation import Attenuation, LayerHistogram, ShellStack
 from pipelines.photo_fur.figures import DepthFigures
-from pipelines.photo_fur.laid_fur import Hair, LaidFur
-from pipelines.photo_fur.laying import Laying
+from pipelines.photo_fur.laid_fur import Hair, LaidFur, laid_fur
+from pipelines.photo_fur.laying import Laying, Patches
 from pipelines.photo_fur.lie import LieField
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.photograph_lie import PhotographLie
@@ -166,8 +166,11 @@ def lie_field_dataset(
     )
 
 
-def fur_patches_dataset(laying: Laying, lie: PhotographLie, width: float) -> xr.Dataset:
-    """`fur_patches` of a photograph on a mesh, as wide as ``width`` there."""
+def fur_patches_dataset(
+    patches: Patches, laying: Laying, lie: PhotographLie, *, width: float, spacing: float
+) -> xr.Dataset:
+    """`fur_patches` of a photograph on a mesh, as wide as ``width`` there, with patches' middles
+    ``spacing`` apart."""
     import numpy as np
     import xarray as xr
 
@@ -178,18 +181,26 @@ def fur_patches_dataset(laying: Laying, lie: PhotographLie, width: float) -> xr.
             "uvs": (("corner_vertex", "slot", "uv"), laying.uvs),
             "weights": (("corner_vertex", "slot"), laying.weights),
             "patches": (("triangle", "slot"), laying.patches),
-            "middles": ("patch", laying.middles),
+            "middles": ("patch", patches.middles),
+            "places": (("patch", "uv"), patches.places.astype(np.float32)),
+            "directions": ("patch", patches.directions.astype(np.float32)),
             "direction": (_PIXELS, lie.direction.astype(np.float32)),
             "coherence": (_PIXELS, lie.coherence.astype(np.float32)),
             "slant": ((), lie.slant),
             "width": ((), width),
+            "spacing": ((), spacing),
         }
     )
 
 
 def laying_of(fur_patches: xr.Dataset) -> Laying:
-    """The patches that a `fur_patches` dataset holds."""
+    """The photograph laid over a mesh, as a `fur_patches` dataset holds it."""
     return Laying(*(fur_patches[name].values for name in Laying._fields))
+
+
+def patches_of(fur_patches: xr.Dataset) -> Patches:
+    """Which patches a `fur_patches` dataset has laid."""
+    return Patches(*(fur_patches[name].values for name in Patches._fields))
 
 
 def hair_of(lie_field: xr.Dataset) -> Hair:
@@ -200,14 +211,7 @@ def hair_of(lie_field: xr.Dataset) -> Hair:
 def laid_fur_of(shell_mesh: xr.Dataset, lie_field: xr.Dataset, fur_patches: xr.Dataset) -> LaidFur:
     """The fur laid over the mesh, as it is drawn."""
     mesh, laying, hair = shell_mesh_of(shell_mesh), laying_of(fur_patches), hair_of(lie_field)
-    return LaidFur(
-        mesh.vertices[-1][laying.vertex],
-        mesh.normals[laying.vertex],
-        hair.tangents[laying.vertex],
-        laying,
-        (mesh.thickness * hair.lengths)[laying.vertex],
-        mesh.layers,
-    )
+    return laid_fur(mesh.vertices[-1], mesh.normals, hair, laying, mesh.thickness, mesh.layers)
 
 
 def frames_dataset(frames: Frames, views: Sequence[View]) -> xr.Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
@@ -20,7 +20,7 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.system import Pictures, Progress, Result
 from pipelines.photo_fur import figures
 from pipelines.photo_fur.attenuation import Tails
-from pipelines.photo_fur.stage_view import Fill
+from pipelines.photo_fur.stage_view import Fill, Look
 from storage.schemas import photo_fur as schemas
 from storage.stored_version import StoredVersion
 
@@ -43,7 +43,7 @@ class FrameSettings(Settings):
         description="Pixels across, 4:3; the square's pictures go by the photograph's size",
     )
     supersampling: int = Field(2, ge=1, le=8, description="Samples along each side of a pixel")
-    look: Literal["full", "plain"] = Field(
+    look: Look = Field(
         "full",
         description="Full: patches along the lie, light on hairs; plain: shells by texture "
         "coordinates, as in the paper. The square is always plain",
@@ -164,7 +164,8 @@ def _plain(
 
     views, size = frames.ROUND_VIEWS, (settings.width * 3 // 4, settings.width)
     if is_square:
-        mesh = frames.stretched_to_photograph(mesh, photograph)
+        height, width = photograph.luminance.shape
+        mesh = frames.stretched(mesh, width / height)
         views, size = frames.SQUARE_VIEWS, frames.top_view_size(photograph.luminance.shape)
     drawn = frames.draw_frames(
         photograph,

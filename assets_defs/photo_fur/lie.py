@@ -198,27 +198,20 @@ def fur_patches(
     settings: PatchSettings, fur_photo: xr.Dataset, shell_mesh: xr.Dataset, lie_field: xr.Dataset
 ) -> Result:
     """Lay the photograph over the mesh in patches, each turned along the lie."""
-    from pipelines.photo_fur.laying import lay_patches
+    from pipelines.photo_fur.laying import Body, choose_patches, lay
     from pipelines.photo_fur.photograph_lie import photograph_lie
     from pipelines.photo_fur.shells import mesh_radius
 
     mesh = shell_mesh_of(shell_mesh)
-    skin = mesh.vertices[-1].astype("float64")
-    width = settings.photograph_width * mesh_radius(skin)
+    width = settings.photograph_width * mesh_radius(mesh.vertices[-1])
     lie = photograph_lie(fur_photo["luminance"].values, opaque_of(fur_photo))
     spacing = _spacing(settings, fur_photo, mesh, width)
-    laying = lay_patches(
-        skin,
-        mesh.triangles,
-        lie_field["tangents"].values.astype("float64"),
-        mesh.normals,
-        _pieces(fur_photo, lie, spacing / width),
-        spacing=spacing,
-        width=width,
-        seed=settings.patch_seed,
-    )
-    shown = {"patches": len(laying.middles), "sign's skewness": lie.slant}
-    return fur_patches_dataset(laying, lie, width), shown
+    body = Body(mesh.vertices[-1], mesh.triangles, lie_field["tangents"].values, mesh.normals)
+    pieces = _pieces(fur_photo, lie, spacing / width)
+    patches = choose_patches(body, pieces, spacing=spacing, seed=settings.patch_seed)
+    laying = lay(body, patches, spacing=spacing, width=width)
+    shown = {"patches": len(patches.middles), "sign's skewness": lie.slant}
+    return fur_patches_dataset(patches, laying, lie, width=width, spacing=spacing), shown
 
 
 def _spacing(

@@ -12,8 +12,10 @@ order of the method:
    ``frames``: pictures of it from several views (``draw_frames``).
 5. ``lie``: how hair lies on a body (``lie_field``); ``photograph_lie``: and in the photograph, of
    which pieces may be taken (``pieces_of``); ``laying``: pieces laid over the body in patches
-   (``lay_patches``; ``chart_kernel`` is its compiled part); ``laid_fur``: these on the stage
-   (``laid_surface``), ``frames`` draws them (``draw_laid_frames``).
+   (``choose_patches``, ``lay``; ``chart_kernel`` is their compiled part); ``laid_fur``: these on
+   the stage (``laid_surface``), ``frames`` draws them (``draw_laid_frames``).
+6. ``packed_fur``: what a package holds of all that (``packed_fur``), by ``packed_photograph`` and
+   ``lie_codes``; ``live_parts``: the scene that live views show, and their reference pictures.
 
 ``pictures`` shows the histogram and the layers; ``figures`` tells whether results are right.
 """

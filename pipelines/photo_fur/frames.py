@@ -147,10 +147,9 @@ def top_view_size(shape: tuple[int, ...]) -> tuple[int, int]:
     return height * times, width * times
 
 
-def stretched_to_photograph(mesh: ShellMesh, photograph: FurPhotograph) -> ShellMesh:
-    """The unit square stretched in x to the photograph's proportions."""
-    height, width = photograph.luminance.shape
-    vertices = mesh.vertices * np.array([width / height, 1.0, 1.0])
+def stretched(mesh: ShellMesh, aspect: float) -> ShellMesh:
+    """The unit square stretched in x to a photograph's proportions, width over height."""
+    vertices = mesh.vertices * np.array([aspect, 1.0, 1.0])
     return mesh._replace(vertices=vertices.astype(np.float32))
 
 

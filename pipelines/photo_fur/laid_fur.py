@@ -11,6 +11,7 @@ shadows, the deeper in the fur and the lower the lamp.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,8 @@ from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, code_steps
 from pipelines.photo_fur.laying import Laying
-from pipelines.photo_fur.stage_view import FurLight, layers_with_hair
+from pipelines.photo_fur.shells import mesh_radius
+from pipelines.photo_fur.stage_view import FurLight
 
 BEND = 0.5
 """How far tips lean along the lie, in thicknesses."""
@@ -28,9 +30,21 @@ HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
+SPREAD = 1.4
+"""How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
+true ones least are nearer to their mean, and of those an outline would be smooth."""
+GUSTS = 4.0
+"""Radians of a gust over a mesh radius."""
+FEWEST_SHELLS, SHELLS_A_PIXEL = 4, 2.5
+LAID_SHADERS = ("fur_laid_vertex.glsl", "fur_laid_fragment.glsl")
+"""Of vertices and fragments of fur laid in patches."""
 
 
 SHADING = {
+    "CONTRAST": 0.0,
+    "DIM": 0.2,
+    "MOST_DIM": 1.7,
+    "STANDS": 0.15,  # how far down from its own depth a hair stands, thicknesses
     "HOT_SPOT": 0.35,  # radians from the view within which a lamp lights all that is seen
     "SLANT": 0.1,  # lengths of attenuation that slanting light has more of than light from above
     "MOST_SLANT": 0.8,
@@ -52,25 +66,61 @@ class Hair(NamedTuple):
     """(V,): 1 for the fur's thickness."""
 
 
+class Wind(NamedTuple):
+    """Wind that blows level, in gusts."""
+
+    strength: float = 0.0
+    """How far tips are blown, in thicknesses."""
+    moment: float = 0.0
+    """Seconds since the gusts began."""
+
+
+CALM = Wind()
+
+
 class LaidFur(NamedTuple):
     """A body with a photograph laid over it in patches.
 
-    Vertices are those of the laying: skin, normals and tangents (N, 3) float32; thickness (N,) of
-    the fur, in mesh units.
+    Vertices are those of the laying: skin, normals and tangents (N, 3) float32; lengths (N,) of the
+    hair, 1 for the fur's thickness.
     """
 
     skin: NDArray[np.float32]
     normals: NDArray[np.floating]
     tangents: NDArray[np.floating]
     laying: Laying
-    thickness: NDArray[np.floating]
+    lengths: NDArray[np.floating]
+    thickness: float
+    """Mesh units."""
     layers: int
 
     @property
     def reach(self) -> NDArray[np.float32]:
-        """(2 N, 3): the skin, and where the tips may be at the most."""
-        lifted = self.thickness[:, None] * (self.normals + BEND * self.tangents)
-        return np.concatenate([self.skin, self.skin + lifted]).astype(np.float32)
+        """(2 N, 3): the skin, and where the tips may be at the most without wind."""
+        lifted = self.normals + BEND * self.tangents
+        tips = self.skin + self.thickness * self.lengths[:, None] * lifted
+        return np.concatenate([self.skin, tips]).astype(np.float32)
+
+
+def laid_fur(
+    vertices: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    hair: Hair,
+    laying: Laying,
+    thickness: float,
+    layers: int,
+) -> LaidFur:
+    """The fur on a mesh, vertices and normals (V, 3), as it is drawn."""
+    of = laying.vertex
+    return LaidFur(
+        vertices[of].astype(np.float32),
+        normals[of],
+        hair.tangents[of],
+        laying,
+        hair.lengths[of],
+        thickness,
+        layers,
+    )
 
 
 def laid_surface(
@@ -78,15 +128,21 @@ def laid_surface(
     image: NDArray[np.uint8],
     attenuation: Attenuation,
     light: FurLight,
+    *,
+    wind: Wind = CALM,
+    shells: int | None = None,
     wrap: Wrap = "mirrored",
 ) -> Any:
     """All shells as one actor, which lights itself; image from ``fur_texture`` for its layers.
 
-    wrap: what is beyond the photograph; of one that is a tile, "repeat".
+    shells: how many are drawn, by default as many as there are layers; wrap: what is beyond the
+    photograph; of one that is a tile, "repeat".
     """
-    layers, count = fur.layers, len(fur.skin)
-    drawn = layers_with_hair(image, layers)
-    laying, uvs = fur.laying, texture_coordinates(fur.laying.uvs, image.shape[:2])
+    shells = shells or fur.layers
+    middle, highest = middle_depth(image, fur.layers), highest_depth(image, fur.layers)
+    drawn = np.arange(int(highest * shells) + 1, shells + 1)
+    count, laying = len(fur.skin), fur.laying
+    uvs = texture_coordinates(laying.uvs, image.shape[:2])
 
     def each(values: NDArray[np.floating]) -> NDArray[np.floating]:
         return np.tile(values, (len(drawn), 1))
@@ -97,7 +153,7 @@ def laid_surface(
         (laying.triangles[None] + offsets).reshape(-1, 3),
         attributes={
             "layer": np.repeat(drawn, count),
-            "thickness": np.tile(fur.thickness, len(drawn)),
+            "hairLength": np.tile(fur.lengths, len(drawn)),
             "outward": each(fur.normals),
             "along": each(fur.tangents),
             "uvs": each(uvs[:, :2].reshape(count, 4)),
@@ -106,22 +162,68 @@ def laid_surface(
         },
         textures={"photograph": texture(image, wrap=wrap, srgb=True)},
         shader=surface_shader(
-            "fur_laid_vertex.glsl",
-            "fur_laid_fragment.glsl",
-            CODE_STEPS=float(code_steps(layers)),
-            DECAY=attenuation.coefficient / layers,
-            LAYERS=float(layers),
-            BEND=BEND,
-            HEIGHT_OF_WEIGHT=HEIGHT_OF_WEIGHT,
-            GLOSS=GLOSS,
-            **SHADING,
+            *LAID_SHADERS,
+            CODES=float(code_steps(fur.layers) * fur.layers),
+            DECAY=attenuation.coefficient,
+            MIDDLE=middle,
+            LAYERS=float(shells),
+            THICKNESS=float(fur.thickness),
+            WIND=float(wind.strength),
+            MOMENT=float(wind.moment),
+            GUST=GUSTS / mesh_radius(fur.skin),
             SKY=float(light.sky),
             HEADLIGHT=float(light.headlight),
             LAMP=float(light.lamp),
             LAMP_TOWARDS=light.light,
+            **constants(),
         ),
         lit=False,
     )
+
+
+def constants() -> dict[str, Any]:
+    """Names in capitals of the shader that are the same for every fur."""
+    return {
+        "BEND": BEND,
+        "HEIGHT_OF_WEIGHT": HEIGHT_OF_WEIGHT,
+        "GLOSS": GLOSS,
+        "SPREAD": SPREAD,
+        **SHADING,
+    }
+
+
+def packed_constants() -> dict[str, float]:
+    """All numbers of the full look that readers of packages need, by name."""
+    shells = {"FEWEST_SHELLS": FEWEST_SHELLS, "SHELLS_A_PIXEL": SHELLS_A_PIXEL}
+    return constants() | shells | {"GUSTS": GUSTS}
+
+
+def middle_depth(image: NDArray[np.uint8], layers: int) -> float:
+    """Mean depth of the hair, thicknesses; image from ``fur_texture``.
+
+    >>> image = np.full((2, 2, 4), 126, np.uint8)  # 63 codes a layer
+    >>> middle_depth(image, 4)
+    0.5
+    """
+    codes, most = image[..., 3].astype(np.float64), code_steps(layers) * layers
+    hair = codes[codes < most]
+    return float(hair.mean() / most) if len(hair) else 0.5
+
+
+def highest_depth(image: NDArray[np.uint8], layers: int) -> float:
+    """Depth of the highest hair as it is drawn, thicknesses."""
+    middle, most = middle_depth(image, layers), code_steps(layers) * layers
+    highest = middle + SPREAD * (float(image[..., 3].min()) / most - middle)
+    return float(np.clip(highest, 0.0, 1.0 - 1e-6))
+
+
+def shells_seen(fur_pixels: float, layers: int) -> int:
+    """How many shells fur needs that is so many rows of samples thick, at most `layers`.
+
+    >>> shells_seen(100.0, 15), shells_seen(2.0, 15)
+    (15, 5)
+    """
+    return min(layers, max(FEWEST_SHELLS, math.ceil(SHELLS_A_PIXEL * fur_pixels)))
 
 
 def texture_coordinates(

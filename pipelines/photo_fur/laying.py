@@ -37,6 +37,17 @@ class Piece(NamedTuple):
     """(n,): how the hair lies there, radians from the photograph's x towards its y (up)."""
 
 
+class Patches(NamedTuple):
+    """Which patches a mesh has."""
+
+    middles: NDArray[np.int64]
+    """(P,): the vertex in the middle of each."""
+    places: NDArray[np.floating]
+    """(P, 2): what of the photograph is there, in widths, origin bottom left."""
+    directions: NDArray[np.floating]
+    """(P,): how the hair lies there, radians from the photograph's x towards its y (up)."""
+
+
 class Laying(NamedTuple):
     """Patches on a mesh. Vertices are split where the patches at a place are others."""
 
@@ -50,42 +61,55 @@ class Laying(NamedTuple):
     """(N, SLOTS): of the patches, adding up to 1."""
     patches: NDArray[np.int64]
     """(F, SLOTS): which patches a triangle shows; -1 for none."""
-    middles: NDArray[np.int64]
-    """(P,): the vertex in the middle of each patch."""
 
 
-def lay_patches(
-    points: NDArray[np.floating],
-    triangles: NDArray[np.integer],
-    tangents: NDArray[np.floating],
-    normals: NDArray[np.floating],
-    piece: Piece,
-    *,
-    spacing: float,
-    width: float,
-    seed: int = 0,
-) -> Laying:
-    """Cover a mesh with patches of a photograph.
+class Body(NamedTuple):
+    """What patches are laid over. Copies of a vertex count as one."""
 
-    points, normals, tangents (V, 3): tangents are the lie of the hair; copies of a vertex count as
-    one. triangles (F, 3). spacing: distance of neighbouring patches' middles; width: of the
-    photograph as it lies on the surface; both in mesh units. Raises ValueError where they are not
-    positive.
+    points: NDArray[np.floating]
+    """(V, 3), mesh units."""
+    triangles: NDArray[np.integer]
+    """(F, 3)."""
+    tangents: NDArray[np.floating]
+    """(V, 3): unit vectors along the lie of the hair."""
+    normals: NDArray[np.floating]
+    """(V, 3)."""
+
+
+def choose_patches(body: Body, piece: Piece, *, spacing: float, seed: int = 0) -> Patches:
+    """Cover a body with patches of a photograph, each of a piece that its neighbours have not.
+
+    spacing: distance of neighbouring patches' middles, mesh units. Raises ValueError where it is
+    not positive.
     """
-    for name, value in (("spacing", spacing), ("width", width)):
+    _require_lengths(spacing=spacing)
+    random = np.random.default_rng(seed)
+    joined = _Joined.of(body)
+    middles = _spread_out(joined.around, spacing)
+    charts = _charts(joined.around, middles, REACH * spacing)
+    where = _places(middles, charts, piece, random)
+    return Patches(joined.first[middles], piece.places[where], piece.directions[where])
+
+
+def lay(body: Body, patches: Patches, *, spacing: float, width: float) -> Laying:
+    """Lay chosen patches over their body, at the spacing that they were chosen for.
+
+    width: of the photograph as it lies on the surface, mesh units. Packages hold the patches, and
+    readers do this. Raises ValueError for lengths that are not positive.
+    """
+    _require_lengths(spacing=spacing, width=width)
+    joined = _Joined.of(body)
+    corners = joined.position[body.triangles]
+    charts = _charts(joined.around, joined.position[patches.middles], REACH * spacing)
+    shown = _shown(corners, charts)
+    vertex, split, uvs, weights = _split(corners, shown, charts, patches, width)
+    return Laying(joined.first[vertex], split, uvs, weights, shown)
+
+
+def _require_lengths(**lengths: float) -> None:
+    for name, value in lengths.items():
         if not value > 0:
             raise ValueError(f"{name} is {value:g}; expected a positive length.")
-    random = np.random.default_rng(seed)
-    first, position = joined_vertices(points, normals)
-    corners = position[triangles]
-    apart = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-    around = _Neighbours.of(points[first], apart, tangents[first], normals[first])
-    middles = _spread_out(around, spacing)
-    charts = _charts(around, middles, REACH * spacing)
-    where = _places(middles, charts, piece, random)
-    shown = _shown(corners, charts)
-    vertex, split, uvs, weights = _split(corners, shown, charts, where, piece, width)
-    return Laying(first[vertex], split, uvs, weights, shown, first[middles])
 
 
 def least_spacing(points: NDArray[np.floating], triangles: NDArray[np.integer]) -> float:
@@ -96,6 +120,27 @@ def least_spacing(points: NDArray[np.floating], triangles: NDArray[np.integer]) 
 
 
 # ---- the surface -----------------------------------------------------------------------------
+
+
+class _Joined(NamedTuple):
+    """A body without copies of vertices."""
+
+    first: NDArray[np.int64]
+    """(P,): the body's vertex that each position has first."""
+    position: NDArray[np.int64]
+    """(V,)."""
+    around: _Neighbours
+
+    @classmethod
+    def of(cls, body: Body) -> _Joined:
+        points, tangents, normals = (
+            each.astype(np.float64) for each in (body.points, body.tangents, body.normals)
+        )
+        first, position = joined_vertices(points, normals)
+        corners = position[body.triangles]
+        apart = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+        around = _Neighbours.of(points[first], apart, tangents[first], normals[first])
+        return cls(first, position, around)
 
 
 class _Neighbours(NamedTuple):
@@ -280,8 +325,7 @@ def _split(
     triangles: NDArray[np.int64],
     shown: NDArray[np.int64],
     charts: _Charts,
-    where: NDArray[np.int64],
-    piece: Piece,
+    patches: Patches,
     width: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
     """Vertices with the coordinates of their triangle's patches, shared where these are the same:
@@ -293,7 +337,7 @@ def _split(
     share = np.where(is_there, charts.weight[row], 0.0)
     total = share.sum(axis=1, keepdims=True)
     at = np.where(is_there[..., None], charts.place[row], 0.0) / width
-    angle = piece.directions[where[patch]]
+    angle = patches.directions[patch]
     cosine, sine = np.cos(angle), np.sin(angle)
     turned = np.stack(
         [cosine * at[..., 0] - sine * at[..., 1], sine * at[..., 0] + cosine * at[..., 1]], axis=-1
@@ -301,6 +345,6 @@ def _split(
     return (
         vertex,
         number.reshape(-1, 3).astype(np.int32),
-        (piece.places[where[patch]] + turned).astype(np.float32),
+        (patches.places[patch] + turned).astype(np.float32),
         (share / np.where(total > 0, total, 1.0)).astype(np.float32),
     )

@@ -1,14 +1,15 @@
 """The fur as live views show it: settings, reference views, poster, and the shader of shells.
 
 Live views lift the shells in their vertex shader, so that thickness and number of layers can be
-changed while they draw; the stage has them lifted before. Both show the same.
+changed while they draw. Of the plain look the stage has them lifted before; both show the same.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,21 @@ from pipelines.drawing.glsl import shader_source
 from pipelines.drawing.stage import Camera, Light, Stage, Vector
 from pipelines.photo_fur.attenuation import Tails
 from pipelines.photo_fur.frames import BACKGROUND, ROUND_VIEWS, View, view_cameras
+from pipelines.photo_fur.laid_fur import (
+    CALM,
+    LAID_SHADERS,
+    LaidFur,
+    Wind,
+    laid_surface,
+    shells_seen,
+)
 from pipelines.photo_fur.photograph import FurPhotograph
-from pipelines.photo_fur.shells import ShellMesh, shell_vertices
+from pipelines.photo_fur.shells import ShellMesh, mesh_radius, shell_vertices
 from pipelines.photo_fur.stage_view import (
     LIVE_SHADERS,
     Fill,
     FurLight,
+    Look,
     fur_surface,
     fur_texture,
     live_surface,
@@ -36,11 +46,14 @@ NIGHT = (0.012, 0.013, 0.016)
 """Linear radiance behind the fur of posters."""
 LAMP = (-0.48, -0.6, 0.64)
 """Where the lamp of close pictures and of the poster is: to the left of the front, above."""
+OUTDOORS = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=LAMP)
+"""Light of live views at first."""
 _SIDES = ("front", "right", "back", "left")
 _POSTER_VIEW = View(-62.0, 24.0)
 _CLOSE_VIEW = View(-70.0, 30.0)
 _CLOSE = 0.42
 _NEAR = 0.65
+_FAR = 6.0
 """Distances of these pictures, in distances from which all is seen."""
 
 
@@ -53,6 +66,9 @@ class FurLook:
     light: FurLight
     thickness: float = 1.0
     """In thicknesses of the mesh's own fur."""
+    look: Look = "plain"
+    wind: Wind = CALM
+    """Of the full look."""
 
 
 class ReferenceView(NamedTuple):
@@ -70,8 +86,11 @@ class ReferenceView(NamedTuple):
 class FurScene:
     """A photograph of fur on a mesh, to be drawn in any look."""
 
-    def __init__(self, photograph: FurPhotograph, mesh: ShellMesh, tails: Tails) -> None:
-        self.photograph, self.mesh, self.tails = photograph, mesh, tails
+    def __init__(
+        self, photograph: FurPhotograph, mesh: ShellMesh, fur: LaidFur, tails: Tails
+    ) -> None:
+        """mesh: for the plain look; fur: the photograph laid over it, for the full one."""
+        self.photograph, self.mesh, self.fur, self.tails = photograph, mesh, fur, tails
 
     def frame(
         self,
@@ -80,27 +99,13 @@ class FurScene:
         size: tuple[int, int],
         supersampling: int = SUPERSAMPLING,
     ) -> NDArray[np.uint8]:
-        """A picture of size = (height, width) pixels, 8-bit sRGB, lit by the stage: without sky."""
-        skin, height, width = self.mesh.vertices[-1], *size
-        shells = shell_vertices(
-            skin, self.mesh.normals, look.thickness * self.mesh.thickness, look.layers
-        )
-        image = fur_texture(self.photograph, look.layers, tails=self.tails)
+        """A picture of size = (height, width) pixels, 8-bit sRGB; the plain look has no sky."""
+        height, width = size
         with Stage(width, height, background=BACKGROUND, supersampling=supersampling) as stage:
-            stage.add(
-                fur_surface(
-                    shells,
-                    self.mesh.normals,
-                    self.mesh.triangles,
-                    self.mesh.uvs,
-                    image,
-                    self.photograph.attenuation,
-                    fill=look.fill,
-                    wrap="mirrored",
-                    interpolate=True,
-                    lit=True,
-                )
-            )
+            if look.look == "full":
+                stage.add(self._laid(look, camera, height * supersampling))
+            else:
+                stage.add(self._plain(look))
             light = look.light
             stage.light(
                 Light(colour=(light.headlight,) * 3), Light(light.light, colour=(light.lamp,) * 3)
@@ -108,30 +113,72 @@ class FurScene:
             stage.look(camera)
             return stage.frame()
 
+    def _plain(self, look: FurLook) -> Any:
+        """The actor, lit by the stage."""
+        mesh = self.mesh
+        thickness = look.thickness * mesh.thickness
+        return fur_surface(
+            shell_vertices(mesh.vertices[-1], mesh.normals, thickness, look.layers),
+            mesh.normals,
+            mesh.triangles,
+            mesh.uvs,
+            fur_texture(self.photograph, look.layers, tails=self.tails),
+            self.photograph.attenuation,
+            fill=look.fill,
+            wrap="mirrored",
+            interpolate=True,
+            lit=True,
+        )
+
+    def _laid(self, look: FurLook, camera: Camera, height: int) -> Any:
+        """The actor, with no more shells than a picture of so many rows of samples shows."""
+        fur = self.fur._replace(thickness=look.thickness * self.fur.thickness)
+        seen = fur_pixels(camera, self.mesh.vertices[-1], fur.thickness, height)
+        return laid_surface(
+            fur,
+            fur_texture(self.photograph, fur.layers, tails=self.tails),
+            self.photograph.attenuation,
+            look.light,
+            wind=look.wind,
+            shells=shells_seen(seen, look.layers),
+        )
+
     def cameras(self, views: Sequence[View], aspect: float) -> list[Camera]:
         """One camera a view, which has all of the fur in its picture."""
         return view_cameras(views, self.mesh.vertices.reshape(-1, 3), aspect)
 
-    def reference_views(self, fill: Fill, size: tuple[int, int]) -> tuple[ReferenceView, ...]:
-        """The four sides, a close one under the lamp, and one whose shells are others.
+    def reference_views(
+        self, look: Look, fill: Fill, size: tuple[int, int]
+    ) -> tuple[ReferenceView, ...]:
+        """The four sides and a close one under the lamp, then each look, in wind and from afar, and
+        plain with other shells.
 
         size: (height, width) of the pictures, pixels.
         """
-        height, width = size
-        own = FurLook(self.mesh.layers, fill, FurLight(light=LAMP))
-        aspect = width / height
+        light = FurLight(light=LAMP)
+        plain = FurLook(self.mesh.layers, fill, light)
+        own = replace(plain, look=look)
+        lit = replace(own, light=FurLight(headlight=0.4, lamp=0.9, light=LAMP))
+        full = replace(plain, look="full", light=OUTDOORS)
+        others = replace(
+            plain, layers=max(2, self.mesh.layers // 2), fill=_other(fill), thickness=1.6
+        )
+        (whole,) = self.cameras([_CLOSE_VIEW], size[1] / size[0])
+        sides = self.cameras(ROUND_VIEWS, size[1] / size[0])
+        close, near, far = (_nearer(whole, share) for share in (_CLOSE, _NEAR, _FAR))
         taken = [
-            (name, own, camera, SUPERSAMPLING)
-            for name, camera in zip(_SIDES, self.cameras(ROUND_VIEWS, aspect), strict=True)
+            *((name, own, camera) for name, camera in zip(_SIDES, sides, strict=True)),
+            ("close", lit, close),
+            ("full", full, near),
+            ("wind", replace(full, wind=Wind(0.8, 1.3)), near),
+            ("far", full, far),
+            ("plain", plain, near),
+            ("other_shells", others, near),
         ]
-        (whole,) = self.cameras([_CLOSE_VIEW], aspect)
-        lit = FurLook(self.mesh.layers, fill, FurLight(headlight=0.4, lamp=0.9, light=LAMP))
-        others = FurLook(max(2, self.mesh.layers // 2), _other(fill), own.light, thickness=1.6)
-        taken.append(("close", lit, _nearer(whole, _CLOSE), SUPERSAMPLING))
-        taken.append(("other_shells", others, _nearer(whole, _NEAR), _FINE))
         return tuple(
-            ReferenceView(name, look, camera, samples, self.frame(look, camera, size, samples))
-            for name, look, camera, samples in taken
+            ReferenceView(name, each, camera, samples, self.frame(each, camera, size, samples))
+            for name, each, camera in taken
+            for samples in (_FINE if each.fill == "bands" else SUPERSAMPLING,)
         )
 
     def live_frame(
@@ -144,34 +191,44 @@ class FurScene:
         """A picture of size = (height, width) pixels, 8-bit sRGB, as live views draw it."""
         mesh, (height, width) = self.mesh, size
         with Stage(width, height, background=background, supersampling=SUPERSAMPLING) as stage:
-            stage.add(
-                live_surface(
-                    mesh.vertices[-1],
-                    mesh.normals,
-                    mesh.triangles,
-                    mesh.uvs,
-                    fur_texture(self.photograph, look.layers, tails=self.tails),
-                    self.photograph.attenuation,
-                    layers=look.layers,
-                    thickness=look.thickness * mesh.thickness,
-                    fill=look.fill,
-                    light=look.light,
+            if look.look == "full":
+                stage.add(self._laid(look, camera, height * SUPERSAMPLING))
+            else:
+                stage.add(
+                    live_surface(
+                        mesh.vertices[-1],
+                        mesh.normals,
+                        mesh.triangles,
+                        mesh.uvs,
+                        fur_texture(self.photograph, look.layers, tails=self.tails),
+                        self.photograph.attenuation,
+                        layers=look.layers,
+                        thickness=look.thickness * mesh.thickness,
+                        fill=look.fill,
+                        light=look.light,
+                    )
                 )
-            )
             stage.look(camera)
             return stage.frame()
 
-    def poster(self, fill: Fill, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def poster(self, look: Look, fill: Fill, size: tuple[int, int]) -> NDArray[np.uint8]:
         """What a live view shows at first, size = (height, width) pixels."""
         (camera,) = self.cameras([_POSTER_VIEW], size[1] / size[0])
-        light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=LAMP)
-        return self.live_frame(FurLook(self.mesh.layers, fill, light), camera, size)
+        return self.live_frame(FurLook(self.mesh.layers, fill, OUTDOORS, look=look), camera, size)
 
 
-def luminance_part(photograph: FurPhotograph) -> NDArray[np.float32]:
-    """Luminance (y, x), from which codes of any number of layers follow; transparent: -1."""
-    opaque = True if photograph.opaque is None else photograph.opaque
-    return np.where(opaque, photograph.luminance, -1.0).astype(np.float32)
+def fur_pixels(
+    camera: Camera, vertices: NDArray[np.floating], thickness: float, height: int
+) -> float:
+    """Rows of samples, of a picture with ``height`` of them, that fur so thick takes where a sphere
+    about all vertices (V, 3) is nearest, though not nearer than a tenth of its radius."""
+    if camera.height is not None:
+        return thickness * height / camera.height
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    radius = mesh_radius(vertices)
+    away = float(np.linalg.norm(np.asarray(camera.position) - middle))
+    nearest = max(away - radius, 0.1 * radius)
+    return thickness * height / (2 * math.tan(math.radians(camera.view_angle) / 2) * nearest)
 
 
 def input_picture(photograph: FurPhotograph) -> NDArray[np.uint8]:
@@ -180,12 +237,12 @@ def input_picture(photograph: FurPhotograph) -> NDArray[np.uint8]:
     return to_8bit(np.where(opaque, photograph.radiance, BACKGROUND))
 
 
-def shell_sources() -> tuple[str, str]:
+def shell_sources(look: Look) -> tuple[str, str]:
     """GLSL of the vertices and of the fragments of shells, lifted and lit by themselves.
 
     Names in capitals are left to whoever compiles them.
     """
-    vertex, fragment = LIVE_SHADERS
+    vertex, fragment = LAID_SHADERS if look == "full" else LIVE_SHADERS
     return shader_source(vertex), shader_source(fragment)
 
 

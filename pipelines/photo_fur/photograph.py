@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import luminance
+from pipelines.drawing.colour import luminance, to_8bit
 from pipelines.photo_fur.attenuation import PAPER_ENDS, Attenuation, fit_attenuation
 
 HIGHLIGHT_SHARE = 0.001
@@ -47,6 +47,22 @@ def fur_photograph(
     grey = luminance(radiance)
     medium = fit_attenuation(grey, tail=tail).with_ends_at(ends)
     return FurPhotograph(radiance, grey, medium)
+
+
+def fur_colours(photograph: FurPhotograph) -> NDArray[np.uint8]:
+    """The photograph's colours (y, x, 3), 8-bit sRGB.
+
+    A transparent pixel has the colour of the nearest opaque one: filters mix it into the rim.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    colours = to_8bit(photograph.radiance)
+    if photograph.opaque is None:
+        return colours
+    nearest = distance_transform_edt(
+        ~photograph.opaque, return_distances=False, return_indices=True
+    )
+    return colours[tuple(nearest)]
 
 
 def expose(

@@ -18,13 +18,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Vector, Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, Tails, code_steps, depth_code
-from pipelines.photo_fur.photograph import FurPhotograph
+from pipelines.photo_fur.photograph import FurPhotograph, fur_colours
 
 Fill = Literal["columns", "bands"]
+Look = Literal["full", "plain"]
+"""Patches along the lie and light on hairs, or shells by texture coordinates."""
 LIVE_SHADERS = ("fur_shell_vertex.glsl", "fur_shell_fragment.glsl")
 """Of vertices and fragments of shells that are lifted and lit by themselves."""
 
@@ -44,21 +45,15 @@ class FurLight:
 
 
 def fur_texture(photograph: FurPhotograph, layers: int, *, tails: Tails) -> NDArray[np.uint8]:
-    """The photograph as it is uploaded, (y, x, 4): 8-bit sRGB and the depth code in alpha.
-
-    A transparent pixel has the colour of the nearest opaque one: the filter mixes it into the rim.
-    """
-    from scipy.ndimage import distance_transform_edt
-
-    opaque = photograph.opaque
+    """The photograph as it is uploaded, (y, x, 4): 8-bit sRGB and the depth code in alpha."""
     code = depth_code(
-        photograph.luminance, photograph.attenuation, layers, tails=tails, opaque=opaque
+        photograph.luminance,
+        photograph.attenuation,
+        layers,
+        tails=tails,
+        opaque=photograph.opaque,
     )
-    colours = to_8bit(photograph.radiance)
-    if opaque is not None:
-        nearest = distance_transform_edt(~opaque, return_distances=False, return_indices=True)
-        colours = colours[tuple(nearest)]
-    return np.dstack([colours, code])
+    return np.dstack([fur_colours(photograph), code])
 
 
 def layers_with_hair(image: NDArray[np.uint8], layers: int) -> NDArray[np.int64]:

@@ -147,7 +147,7 @@ LIE_FIELD = Schema(
 FUR_PATCHES = Schema(
     _SYSTEM,
     "fur_patches",
-    1,
+    2,
     "The photograph laid over the mesh in patches that follow the lie (Praun et al. 2000).",
     {
         "vertex": Variable(
@@ -167,6 +167,12 @@ FUR_PATCHES = Schema(
             ("triangle", "slot"), "int64", "1", "Patches that a triangle shows; -1 for none"
         ),
         "middles": Variable(("patch",), "int64", "1", "Vertex in the middle of each patch"),
+        "places": Variable(
+            ("patch", "uv"), "float32", "photograph", "What of the photograph is in the middle"
+        ),
+        "directions": Variable(
+            ("patch",), "float32", "radian", "How the photograph's hair lies there"
+        ),
         "direction": Variable(
             _PIXELS, "float32", "radian", "How hair lies in the photograph, from x towards y (up)"
         ),
@@ -175,6 +181,7 @@ FUR_PATCHES = Schema(
             (), "float64", "1", "Skewness of brightness's steps towards the tips; 0: sign unknown"
         ),
         "width": Variable((), "float64", "mesh unit", "Of the photograph on the surface"),
+        "spacing": Variable((), "float64", "mesh unit", "Between patches' middles"),
     },
 )
 

@@ -26,7 +26,7 @@ from pipelines.photo_fur import (
     stage_view,
     suitability,
 )
-from pipelines.photo_fur.laid_fur import LaidFur
+from pipelines.photo_fur.laid_fur import laid_fur
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.virtual.pelt import pelt as virtual_pelt
 from storage.stored_version import StoredVersion
@@ -86,14 +86,7 @@ def test_what_is_loaded_draws_what_is_stored(good: Any) -> None:
     assert isinstance(photograph, FurPhotograph)
     assert isinstance(mesh, shells.ShellMesh)
     hair, patches = load("lie_field", "teapot"), load("fur_patches", "teapot.pelt")
-    laid = LaidFur(
-        mesh.vertices[-1][patches.vertex],
-        mesh.normals[patches.vertex],
-        hair.tangents[patches.vertex],
-        patches,
-        (mesh.thickness * hair.lengths)[patches.vertex],
-        mesh.layers,
-    )
+    laid = laid_fur(mesh.vertices[-1], mesh.normals, hair, patches, mesh.thickness, mesh.layers)
     drawn = frames.draw_laid_frames(
         photograph, laid, frames.ROUND_VIEWS, (72, 96), 1, "end layers", lambda _: None
     )
@@ -292,7 +285,7 @@ REGRESSIONS = (
     Regression("texture_stretch", shapes, "teapot", _stretched_teapot, PELT_KEYS),
     Regression("outward_share", shapes, "teapot", _inside_out_teapot, PELT_KEYS),
     Regression("guide_error", lie, "lie_field", _sideways_field, PELT_KEYS),
-    Regression("strand_scale_spread", laying, "lay_patches", _drawn_out_patches, PELT_KEYS),
+    Regression("strand_scale_spread", laying, "lay", _drawn_out_patches, PELT_KEYS),
     Regression("lie_error", photograph_lie, "pieces_of", _turned_pieces, PELT_KEYS),
     Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
     Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),

@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING, Any
 from storage.packages import Mesh, Package
 from storage.packages.glb import Z_UP_TO_Y_UP, GlbFile, glb_bytes
 from tsuya.exports.format import Format, Notes
+from tsuya.exports.packaged_fur import packaged_fur
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from pipelines.photo_fur.packed_fur import PackedFur
+
 _SYSTEMS = ("photo_fur",)
 _MIRRORED, _LINEAR = 33648, 9729
 """glTF's numbers of wrapping and of filtering."""
-_TOLD = ("layers", "thickness", "attenuation", "fill")
+_TOLD = ("look", "layers", "thickness", "attenuation", "fill", "middle", "constants")
 """Parameters that the shader is given."""
 
 
@@ -29,24 +32,20 @@ def write_glb(package: Package, target: Path) -> Notes:
     """
     import numpy as np
 
-    from pipelines.photo_fur.shells import shell_vertices
-
-    layers, mesh, glb = package.parameter("layers"), package.mesh("mesh"), GlbFile()
-    assert mesh.normals is not None
-    assert mesh.uvs is not None
+    packed, glb = packaged_fur(package), GlbFile()
+    mesh, picture, layers = packed.mesh, fur_picture(package, packed), packed.mesh.layers
     shared = {
         "NORMAL": glb.values(mesh.normals),
         "TEXCOORD_0": glb.values(np.stack([mesh.uvs[:, 0], 1 - mesh.uvs[:, 1]], axis=1)),
     }
     indices = glb.indices(mesh.triangles)
-    shells = shell_vertices(mesh.vertices, mesh.normals, package.parameter("thickness"), layers)
     primitives = [
         {
             "attributes": shared | {"POSITION": glb.values(shell)},
             "indices": indices,
             "material": number,
         }
-        for number, shell in enumerate(shells)
+        for number, shell in enumerate(mesh.vertices)
     ]
     numbers = range(1, layers + 1)
     document: dict[str, Any] = {
@@ -55,7 +54,7 @@ def write_glb(package: Package, target: Path) -> Notes:
         "nodes": [{"mesh": 0, "rotation": list(Z_UP_TO_Y_UP)}],
         "meshes": [{"primitives": primitives}],
         "images": [
-            {"bufferView": glb.picture(layer_texture(package, n)), "mimeType": "image/png"}
+            {"bufferView": glb.picture(layer_texture(package, picture, n)), "mimeType": "image/png"}
             for n in numbers
         ],
         "samplers": [
@@ -66,23 +65,37 @@ def write_glb(package: Package, target: Path) -> Notes:
     }
     target.write_bytes(glb.whole(document))
     return (
+        "It is the plain look: hair lies as the mesh's texture coordinates have it.",
         f"Each of the {layers} layers is a draw call; masks of 0 and 1 are filtered at their rims, "
         "where the shader compares depths: `--to three` draws as the stage does.",
     )
 
 
-def layer_texture(package: Package, layer: int) -> NDArray[np.uint8]:
+def fur_picture(package: Package, packed: PackedFur) -> NDArray[np.uint8]:
+    """Colours and depth codes (y, x, 4) of a package's own number of layers. Raises BadInput."""
+    from pipelines.photo_fur.stage_view import fur_texture
+    from storage.readers.bad_input import BadInput
+
+    try:
+        photograph = packed.photograph()
+    except ValueError as error:
+        raise BadInput(package.name, "part photograph", str(error), "an AVIF file") from None
+    return fur_texture(photograph, packed.mesh.layers, tails=package.parameter("tails"))
+
+
+def layer_texture(package: Package, picture: NDArray[np.uint8], layer: int) -> NDArray[np.uint8]:
     """What a layer, 1 at the tips, shows of the photograph: (y, x, 4), alpha 0 or 255.
 
-    Raises BadInput for a package that is damaged.
+    picture: of ``fur_picture``. Raises BadInput for a package that is damaged.
     """
     import numpy as np
 
     from pipelines.drawing.colour import decode_srgb, to_8bit
+    from pipelines.photo_fur.attenuation import code_steps
 
-    picture, layers = package.picture("photograph"), package.parameter("layers")
-    own = picture[..., 3] // package.parameter("code_steps") + 1
-    dropped = picture[..., 3] >= layers * package.parameter("code_steps")
+    layers = package.parameter("layers")
+    own = picture[..., 3] // code_steps(layers) + 1
+    dropped = picture[..., 3] >= layers * code_steps(layers)
     colours, stands = picture[..., :3], (own == layer) & ~dropped
     if package.parameter("fill") == "columns":
         stands = (own <= layer) & ~dropped
@@ -112,20 +125,53 @@ def write_three(package: Package, target: Path) -> Notes:
 
     Raises BadInput for a package that is damaged.
     """
-    from pipelines.photo_fur.live_parts import shell_sources
+    from PIL import Image
 
-    mesh = package.mesh("mesh")
-    surface = Mesh(mesh.vertices, mesh.triangles, mesh.normals, mesh.uvs)
-    vertex, fragment = shell_sources()
+    from pipelines.photo_fur.laid_fur import highest_depth
+    from pipelines.photo_fur.live_parts import shell_sources
+    from pipelines.photo_fur.shells import mesh_radius
+
+    packed = packaged_fur(package)
+    picture, mesh = fur_picture(package, packed), packed.mesh
+    is_full = package.parameter("look") == "full"
+    vertex, fragment = shell_sources(package.parameter("look"))
     told = {name: package.parameter(name) for name in _TOLD}
+    told["highest"] = highest_depth(picture, mesh.layers)
+    told["radius"] = mesh_radius(mesh.vertices[-1])
     target.mkdir(parents=True)
     (target / "fur.js").write_bytes(files("tsuya.exports").joinpath("three/fur.js").read_bytes())
     (target / "fur.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     (target / "vertex.glsl").write_text(vertex, encoding="ascii")
     (target / "fragment.glsl").write_text(fragment, encoding="ascii")
+    surface = laid_mesh(packed, picture.shape) if is_full else package.mesh("mesh")
     (target / "surface.glb").write_bytes(glb_bytes(surface))
-    (target / "photograph.png").write_bytes(package.content("photograph"))
+    Image.fromarray(picture).save(target / "photograph.png")
     return ("Lamps of three.js do not light it: `setFur` sets its own light (docs/fur.md).",)
+
+
+def laid_mesh(packed: PackedFur, shape: tuple[int, ...]) -> Mesh:
+    """The surface with what the full look's shader wants of its vertices, for a photograph of this
+    shape: `_ALONG`, `_HAIRLENGTH`, `_UVS` and `_UVTHIRD` (three places, v from the bottom),
+    `_WEIGHTS`."""
+    import numpy as np
+
+    from pipelines.photo_fur.laid_fur import texture_coordinates
+
+    fur = packed.fur()
+    uvs = texture_coordinates(fur.laying.uvs, shape[:2])
+    return Mesh(
+        fur.skin,
+        fur.laying.triangles.astype(np.uint32),
+        fur.normals.astype(np.float32),
+        None,
+        {
+            "ALONG": fur.tangents.astype(np.float32),
+            "HAIRLENGTH": fur.lengths.astype(np.float32),
+            "UVS": uvs[:, :2].reshape(len(uvs), 4),
+            "UVTHIRD": uvs[:, 2],
+            "WEIGHTS": fur.laying.weights,
+        },
+    )
 
 
 FORMATS = (

@@ -39,6 +39,9 @@ describe("depthCodes", () => {
 
 describe("a look", () => {
   const look: Look = {
+    look: "full",
+    wind: 0,
+    moment: null,
     layers: 15,
     thickness: 1,
     fill: "columns",

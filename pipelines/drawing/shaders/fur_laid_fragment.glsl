@@ -36,8 +36,10 @@ float hairLight(vec3 tangent, vec3 light, vec3 view) {
 float lampLight(vec3 tangent, vec3 light, vec3 view, vec3 up, float depth, float below) {
   float cosine = dot(light, up), apart = acos(clamp(dot(light, view), -1.0, 1.0));
   float aside = 1.0 - exp(-apart * apart / (HOT_SPOT * HOT_SPOT));
-  float slanted = min(SLANT * (1.0 / max(cosine, 0.05) - 1.0), MOST_SLANT);
-  float shadow = exp(-BELOW * below - aside * slanted * depth);
+  float slant = 1.0 / max(cosine, 0.05) - 1.0;
+  float contrast = CONTRAST + min(SLANT * slant, MOST_SLANT);
+  float dim = min(DIM * slant, MOST_DIM) + contrast * (depth - DECAY * MIDDLE);
+  float shadow = exp(-BELOW * below - aside * dim);
   float facing = mix(1.0, smoothstep(-DUSK, DUSK, cosine), aside);
   float fibre = hairLight(tangent, light, view) / max(0.4, hairLight(tangent, up, up));
   return pow(fibre, FIBRE) * mix(1.0, ASIDE, aside) * shadow * facing;
@@ -50,20 +52,22 @@ float glint(vec3 tangent, vec3 light, vec3 view) {
   return pow(max(0.0, sine.x * sine.y - cosine.x * cosine.y), 40.0);
 }
 
+// Heights are drawn further from their mean than brightness tells them, by SPREAD, and a hair stands
+// STANDS deep, for it lies rather than stands: below it others are seen.
 vec3 surfaceColour() {
   float height = -10.0;
   vec4 texel = higherHair(vec4(0.0, 0.0, 0.0, 1.0), uvsOut.xy, weightsOut.x, height);
   texel = higherHair(texel, uvsOut.zw, weightsOut.y, height);
   texel = higherHair(texel, uvThirdOut, weightsOut.z, height);
-  vec4 hair = hairInLayer(texel, layerOut, CODE_STEPS, 0.0, true);
-  if (hair.a == 0.0) discard;
+  float own = depthCode(texel.a) / CODES, here = layerOut / LAYERS;
+  float below = here - clamp(MIDDLE + SPREAD * (own - MIDDLE), 0.0, 0.999);
+  bool gap = below > max(STANDS, 1.0 / LAYERS) && layerOut < LAYERS;
+  if (own >= 1.0 || below <= 0.0 || gap) discard;
   vec3 up = normalize(outwardOut), view = vec3(0.0, 0.0, 1.0);
-  float own = floor(depthCode(texel.a) / CODE_STEPS) + 1.0;
-  float depth = DECAY * layerOut, below = DECAY * (layerOut - own);
   vec3 tangent = normalize(alongOut * TILT + up);
-  float lamp = lampLight(tangent, lampOut, view, up, depth, below);
-  float lamps = HEADLIGHT * lampLight(tangent, view, view, up, depth, below) + LAMP * lamp;
-  float over = 1.0 - layerOut / LAYERS;
-  return hair.rgb * (SKY * exp(-BELOW * below) + lamps)
-    + GLOSS * LAMP * lamp * over * glint(tangent, lampOut, view);
+  float darker = DECAY * below, depth = DECAY * own + darker;
+  float lamp = lampLight(tangent, lampOut, view, up, depth, darker);
+  float lamps = HEADLIGHT * lampLight(tangent, view, view, up, depth, darker) + LAMP * lamp;
+  return texel.rgb * (SKY * exp(-BELOW * darker) + lamps)
+    + GLOSS * LAMP * lamp * (1.0 - here) * glint(tangent, lampOut, view);
 }

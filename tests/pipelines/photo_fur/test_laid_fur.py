@@ -10,8 +10,8 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.stage import Stage, orbit
 from pipelines.geometry.shapes import sphere, square
 from pipelines.photo_fur import figures
-from pipelines.photo_fur.laid_fur import BEND, LaidFur, laid_surface
-from pipelines.photo_fur.laying import Laying, Piece, lay_patches
+from pipelines.photo_fur.laid_fur import BEND, Hair, LaidFur, laid_fur, laid_surface
+from pipelines.photo_fur.laying import Body, Laying, Piece, choose_patches, lay
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.stage_view import FurLight, fur_texture
 
@@ -32,16 +32,16 @@ def flat_laying(directions: NDArray[np.floating]) -> tuple[NDArray[np.float64], 
     mesh = square(16)
     places = np.random.default_rng(2).uniform(0.3, 0.7, (len(directions), 2))
     tangents = np.tile(EAST, (len(mesh.vertices), 1))
-    laying = lay_patches(
-        mesh.vertices,
-        mesh.triangles,
-        tangents,
-        mesh.normals,
-        Piece(places, directions),
-        spacing=0.25,
-        width=1.0,
-    )
-    return mesh.vertices, laying
+    body = Body(mesh.vertices, mesh.triangles, tangents, mesh.normals)
+    patches = choose_patches(body, Piece(places, directions), spacing=0.25)
+    return mesh.vertices, lay(body, patches, spacing=0.25, width=1.0)
+
+
+def flat_fur(points: NDArray[np.float64], laying: Laying) -> LaidFur:
+    """Hair to the east on a plane."""
+    count = len(points)
+    hair = Hair(np.tile(EAST, (count, 1)), np.ones(count))
+    return laid_fur(points, np.tile([0.0, 0.0, 1.0], (count, 1)), hair, laying, 0.05, LAYERS)
 
 
 def test_weighted_median_is_that_of_repeated_values() -> None:
@@ -84,16 +84,7 @@ def test_widths_of_hair_are_told_apart() -> None:
 def drawn(light: FurLight, elevation: float, photo: FurPhotograph) -> NDArray[np.float64]:
     """Linear radiance (y, x, 3) of a flat fur, nothing beside it."""
     points, laying = flat_laying(np.zeros(50))
-    normals = np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1))
-    tangents = np.tile(EAST, (len(laying.vertex), 1))
-    fur = LaidFur(
-        points[laying.vertex].astype(np.float32),
-        normals,
-        tangents,
-        laying,
-        np.full(len(laying.vertex), 0.05),
-        LAYERS,
-    )
+    fur = flat_fur(points, laying)
     image = fur_texture(photo, LAYERS, tails="end layers")
     middle = tuple(points.mean(axis=0).tolist())
     with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
@@ -146,14 +137,7 @@ def test_a_photograph_that_is_not_square_is_not_drawn_out() -> None:
         points, laying = flat_laying(np.zeros(50))
         scale = np.float32(1 / times[1])
         laying = laying._replace(uvs=laying.uvs * scale)
-        fur = LaidFur(
-            points[laying.vertex].astype(np.float32),
-            np.tile([0.0, 0.0, 1.0], (len(laying.vertex), 1)),
-            np.tile(EAST, (len(laying.vertex), 1)),
-            laying,
-            np.full(len(laying.vertex), 0.05),
-            LAYERS,
-        )
+        fur = flat_fur(points, laying)
         photo = fur_photograph(np.tile(one, (*times, 1)))
         image = fur_texture(photo, LAYERS, tails="end layers")
         with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
@@ -181,7 +165,8 @@ def test_reach_holds_all_that_is_drawn() -> None:
         mesh.normals,
         mesh.normals,
         laying,
-        np.full(len(mesh.vertices), 0.1),
+        np.ones(len(mesh.vertices)),
+        0.1,
         4,
     )
     assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * (1 + BEND), abs=1e-5)

@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import sphere, square, teapot
-from pipelines.photo_fur.laying import SLOTS, Laying, Piece, lay_patches, least_spacing
+from pipelines.photo_fur.laying import (
+    SLOTS,
+    Body,
+    Laying,
+    Piece,
+    choose_patches,
+    lay,
+    least_spacing,
+)
 from pipelines.photo_fur.lie import guides_backwards, lie_field
 
 
@@ -23,35 +31,30 @@ def laid(
 ) -> Laying:
     guides = guides_backwards(mesh.normals, np.array([1.0, 0.0, 0.0]))
     tangents = lie_field(mesh.vertices, mesh.normals, mesh.triangles, guides, 0.2).tangents
-    return lay_patches(
-        mesh.vertices,
-        mesh.triangles,
-        tangents,
-        mesh.normals,
-        piece,
-        spacing=spacing,
-        width=width,
-        seed=seed,
-    )
+    body = Body(mesh.vertices, mesh.triangles, tangents, mesh.normals)
+    patches = choose_patches(body, piece, spacing=spacing, seed=seed)
+    return lay(body, patches, spacing=spacing, width=width)
 
 
-def gradients(mesh: Mesh, lay: Laying, slot: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def gradients(
+    mesh: Mesh, laying: Laying, slot: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Derivatives (F, 2, 3) of the coordinates along the surface, and where the slot counts."""
-    corners = mesh.vertices[lay.vertex][lay.triangles]
+    corners = mesh.vertices[laying.vertex][laying.triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     frame = np.stack([one, two, np.cross(one, two)], axis=1)
-    uvs = lay.uvs[lay.triangles][:, :, slot].astype(np.float64)
+    uvs = laying.uvs[laying.triangles][:, :, slot].astype(np.float64)
     steps = np.stack([uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0], 0 * uvs[:, 0]], axis=1)
     found = np.linalg.solve(frame, steps).transpose(0, 2, 1)
-    return found, (lay.weights[lay.triangles][:, :, slot] > 0.2).all(axis=1)
+    return found, (laying.weights[laying.triangles][:, :, slot] > 0.2).all(axis=1)
 
 
 def test_a_plane_keeps_lengths_and_directions() -> None:
     """East is the photograph's 30 degrees, one photograph is 2 long, nothing is drawn out."""
     mesh = square(24)
-    lay = laid(mesh, pieces(direction=np.pi / 6))
+    laying = laid(mesh, pieces(direction=np.pi / 6))
     for slot in range(SLOTS):
-        found, counts = gradients(mesh, lay, slot)
+        found, counts = gradients(mesh, laying, slot)
         east = found[counts][:, :, 0]
         np.testing.assert_allclose(
             east, np.tile([np.cos(np.pi / 6) / 2, 0.25], (len(east), 1)), atol=1e-5
@@ -64,34 +67,35 @@ def test_a_plane_keeps_lengths_and_directions() -> None:
 
 @pytest.mark.parametrize("mesh", [(sphere(40)), (teapot(10))])
 def test_patches_share_out_the_surface(mesh: Mesh) -> None:
-    lay = laid(mesh, pieces())
-    np.testing.assert_allclose(lay.weights.sum(axis=1), 1.0, atol=1e-6)
-    assert lay.weights.min() >= 0
+    laying = laid(mesh, pieces())
+    np.testing.assert_allclose(laying.weights.sum(axis=1), 1.0, atol=1e-6)
+    assert laying.weights.min() >= 0
     np.testing.assert_array_equal(
-        mesh.vertices[lay.vertex[lay.triangles]], mesh.vertices[mesh.triangles]
+        mesh.vertices[laying.vertex[laying.triangles]], mesh.vertices[mesh.triangles]
     )
-    assert len(lay.vertex) < 4 * len(mesh.vertices)
+    assert len(laying.vertex) < 4 * len(mesh.vertices)
     # Every patch is seen, and none is seen far from its middle.
-    assert set(lay.patches[lay.patches >= 0]) == set(range(len(lay.middles)))
+    assert set(laying.patches[laying.patches >= 0]) == set(range(laying.patches.max() + 1))
+    assert laying.patches.max() > 3
 
 
 def test_weights_hardly_jump_at_edges() -> None:
     """What a corner has of a patch is the same in all triangles there, but for what a triangle with
     four patches leaves out."""
     mesh = sphere(40)
-    lay = laid(mesh, pieces())
-    shown = np.repeat(lay.patches, 3, axis=0)
-    corner = lay.triangles.ravel()
-    share = np.zeros((len(mesh.vertices), len(lay.middles)))
+    laying = laid(mesh, pieces())
+    shown = np.repeat(laying.patches, 3, axis=0)
+    corner = laying.triangles.ravel()
+    share = np.zeros((len(mesh.vertices), laying.patches.max() + 1))
     for slot in range(SLOTS):
         has = shown[:, slot] >= 0
         np.maximum.at(
-            share, (lay.vertex[corner[has]], shown[has, slot]), lay.weights[corner[has], slot]
+            share, (laying.vertex[corner[has]], shown[has, slot]), laying.weights[corner[has], slot]
         )
     for slot in range(SLOTS):
         has = shown[:, slot] >= 0
-        most = share[lay.vertex[corner[has]], shown[has, slot]]
-        step = most - lay.weights[corner[has], slot]
+        most = share[laying.vertex[corner[has]], shown[has, slot]]
+        step = most - laying.weights[corner[has], slot]
         assert step.mean() < 0.02
         assert np.quantile(step, 0.99) < 0.2
 
@@ -101,11 +105,11 @@ def test_hairs_are_equally_wide_and_follow_the_lie(mesh: Mesh) -> None:
     guides = guides_backwards(mesh.normals, np.array([1.0, 0.0, 0.0]))
     lie = lie_field(mesh.vertices, mesh.normals, mesh.triangles, guides, 0.2)
     piece = pieces(direction=0.7)
-    lay = laid(mesh, piece, spacing=0.25)
+    laying = laid(mesh, piece, spacing=0.25)
     scales, angles = [], []
     tangents = lie.tangents[mesh.triangles].mean(axis=1)
     for slot in range(SLOTS):
-        found, counts = gradients(mesh, lay, slot)
+        found, counts = gradients(mesh, laying, slot)
         scales.append(2 * np.linalg.svd(found[counts], compute_uv=False).ravel())
         along = np.einsum("fuk,fk->fu", found[counts], tangents[counts])
         angles.append(np.degrees(np.arctan2(along[:, 1], along[:, 0]) - 0.7))
@@ -117,10 +121,10 @@ def test_hairs_are_equally_wide_and_follow_the_lie(mesh: Mesh) -> None:
 def test_neighbours_take_different_pieces() -> None:
     mesh = sphere(40)
     piece = pieces()
-    lay = laid(mesh, piece, spacing=0.5)
-    both = (lay.patches >= 0).all(axis=1)
+    laying = laid(mesh, piece, spacing=0.5)
+    both = (laying.patches >= 0).all(axis=1)
     assert both.any()
-    middle = lay.uvs[lay.triangles[both]].mean(axis=1)
+    middle = laying.uvs[laying.triangles[both]].mean(axis=1)
     apart = np.linalg.norm(middle[:, 0] - middle[:, 1], axis=-1)
     assert np.median(apart) > 0.1
 
@@ -142,17 +146,17 @@ def test_coarse_meshes_have_patches_as_wide_as_their_triangles() -> None:
     spacing = least_spacing(mesh.vertices, mesh.triangles)
     side = float(np.ptp(mesh.vertices[:, 0])) / 2
     assert spacing == pytest.approx(1.2 * side * 2**0.5, rel=1e-6)
-    lay = laid(mesh, pieces(direction=0.0), spacing=spacing)
-    best = lay.weights[lay.triangles].mean(axis=1).argmax(axis=1)
+    laying = laid(mesh, pieces(direction=0.0), spacing=spacing)
+    best = laying.weights[laying.triangles].mean(axis=1).argmax(axis=1)
     for slot in range(SLOTS):
-        found, _ = gradients(mesh, lay, slot)
+        found, _ = gradients(mesh, laying, slot)
         east = found[best == slot][:, :, 0]
         np.testing.assert_allclose(east, np.tile([0.5, 0.0], (len(east), 1)), atol=1e-5)
 
 
 def test_a_body_smaller_than_a_patch_has_one() -> None:
     mesh = square(3)
-    lay = laid(mesh, pieces(), spacing=100.0)
-    assert len(lay.middles) == 1
-    assert (lay.weights[:, 0] == 1).all()
-    assert (lay.patches[:, 1:] == -1).all()
+    laying = laid(mesh, pieces(), spacing=100.0)
+    assert laying.patches.max() == 0
+    assert (laying.weights[:, 0] == 1).all()
+    assert (laying.patches[:, 1:] == -1).all()

@@ -26,7 +26,7 @@ from pipelines.photo_fur.frames import (
     SQUARE_VIEWS,
     View,
     draw_frames,
-    stretched_to_photograph,
+    stretched,
     top_view_size,
 )
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
@@ -323,7 +323,7 @@ def frames_of(
     shells = shell_vertices(skin.vertices, skin.normals, thickness, layers)
     mesh = ShellMesh(shells, skin.normals, skin.triangles, skin.uvs, thickness)
     if skin.vertices[:, 2].max() == 0:
-        mesh = stretched_to_photograph(mesh, photo)
+        mesh = stretched(mesh, photo.luminance.shape[1] / photo.luminance.shape[0])
     return draw_frames(
         photo,
         mesh,
@@ -441,10 +441,9 @@ def test_fur_of_more_layers_and_thickness_covers_more_and_never_leaves_the_pictu
 def test_the_square_gets_the_photographs_proportions() -> None:
     corners = np.array([[[0, 0, 0], [1, 1, 0.2]]], np.float32)
     none = np.empty((0, 3))
-    photo = random_photograph(18, (30, 45))
-    stretched = stretched_to_photograph(ShellMesh(corners, none, none, none, 0.2), photo)
-    assert stretched.vertices.dtype == np.float32
-    np.testing.assert_allclose(stretched.vertices, [[[0, 0, 0], [1.5, 1, 0.2]]], rtol=1e-6)
+    wide = stretched(ShellMesh(corners, none, none, none, 0.2), 1.5)
+    assert wide.vertices.dtype == np.float32
+    np.testing.assert_allclose(wide.vertices, [[[0, 0, 0], [1.5, 1, 0.2]]], rtol=1e-6)
 
 
 @pytest.mark.parametrize("shape", [(24, 24), (100, 60), (384, 500), (383, 900), (2000, 3000)])

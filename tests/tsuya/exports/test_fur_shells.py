@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 from collections.abc import Iterator
@@ -10,27 +11,40 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from assets_defs.workspace import CHECKOUT
+from pipelines.photo_fur.stage_view import Fill, Look
 from storage.packages import Package
 from tests.fur_packages import fur_package, tufts
 from tsuya.exports import find_format
 
 LAYERS = 6
 THREE = CHECKOUT / "viewer" / "node_modules" / "three"
-_FILLS = ("columns", "bands")
+_LOOKS: tuple[tuple[Look, Fill], ...] = (
+    ("full", "columns"),
+    ("plain", "columns"),
+    ("plain", "bands"),
+)
 
 
-@pytest.fixture(scope="module", params=_FILLS)
+@pytest.fixture(scope="module", params=_LOOKS, ids=" ".join)
 def package(request: pytest.FixtureRequest) -> Package:
-    return fur_package(request.param, layers=LAYERS)
+    look, fill = request.param
+    return fur_package(look, fill, layers=LAYERS)
 
 
-def _layers_of_pixels() -> tuple[Any, Any]:
+def _codes(package: Package) -> Any:
+    """The photograph's colours (y, x, 3), decoded by Pillow."""
+    with Image.open(io.BytesIO(package.array("photograph").tobytes())) as picture:
+        return np.asarray(picture.convert("RGB")) / 255.0
+
+
+def _layers_of_pixels(linear: Any) -> tuple[Any, Any]:
     """Layer of each pixel, 0 for none, by the closed form; and the medium's decay."""
     photograph = tufts()
     brightest, darkest = photograph.attenuation
-    luminance = photograph.luminance.astype(np.float64)
+    luminance = linear @ [0.2126, 0.7152, 0.0722]
     decay = np.log(brightest / darkest)
     with np.errstate(divide="ignore"):
         depth = np.log(brightest / luminance) / decay
@@ -45,8 +59,9 @@ def _layers_of_pixels() -> tuple[Any, Any]:
 def test_trimesh_and_pillow_read_the_shells(package: Package, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     target = tmp_path / "fur.glb"
-    (note,) = find_format("glb", "photo_fur").write(package, target)
-    assert "6 layers" in note
+    look, layers = find_format("glb", "photo_fur").write(package, target)
+    assert "plain look" in look
+    assert "6 layers" in layers
     read = trimesh.load(target, force="scene", process=False)
     shells = [read.geometry[read.graph[name][1]] for name in read.graph.nodes_geometry]
     shells.sort(key=lambda shell: int(shell.visual.material.name.removeprefix("layer ")))
@@ -55,11 +70,11 @@ def test_trimesh_and_pillow_read_the_shells(package: Package, tmp_path: Path) ->
     turn = read.graph[read.graph.nodes_geometry[0]][0]
     # y is up in the file's world.
     assert np.allclose(turn[:3, :3] @ [0, 0, 1], [0, 1, 0], atol=1e-7)
-    own, decay = _layers_of_pixels()
-    photograph = package.picture("photograph")[..., :3] / 255.0
+    photograph = _codes(package)
     linear = np.where(
         photograph <= 0.04045, photograph / 12.92, ((photograph + 0.055) / 1.055) ** 2.4
     )
+    own, decay = _layers_of_pixels(linear)
     for n, shell in enumerate(shells, start=1):
         expected = mesh.vertices + package.parameter("thickness") * (1 - n / LAYERS) * mesh.normals
         assert np.abs(shell.vertices - expected).max() < 1e-6
@@ -103,7 +118,7 @@ _DRAW = """async ({view, background, glb}) => {
   const turn = new THREE.Quaternion(-Math.SQRT1_2, 0, 0, Math.SQRT1_2);
   const turned = (vector) => new THREE.Vector3(...vector).applyQuaternion(turn);
   const {position, target, up, view_angle} = view.camera;
-  const [width, height] = [2 * view.width, 2 * view.height];
+  const [width, height] = [view.supersampling * view.width, view.supersampling * view.height];
   const camera = new THREE.PerspectiveCamera(view_angle, width / height, 0.1, 50);
   camera.position.copy(turned(position));
   camera.up.copy(turned(up));
@@ -117,8 +132,7 @@ _DRAW = """async ({view, background, glb}) => {
   } else {
     const { loadFur, setFur } = await import("/export/fur.js");
     const fur = await loadFur(new URL("/export/", location));
-    const {headlight, lamp, light} = view.state;
-    setFur(fur, {headlight, lamp, light});
+    setFur(fur, view.state.thickness === 1 ? {...view.state, thickness: undefined} : view.state);
     scene.add(fur);
   }
   const made = new THREE.WebGLRenderTarget(width, height, {type: THREE.FloatType});
@@ -165,7 +179,9 @@ def _psnr(page: Any, package: Package, view: dict[str, Any], *, glb: bool = Fals
     background = package.parameter("background")
     asked = {"view": view, "background": background, "glb": glb}
     flat = page.evaluate(_DRAW, asked)
-    radiance = np.array(flat).reshape(view["height"], 2, view["width"], 2, 4)[::-1, ::-1]
+    samples = view["supersampling"]
+    shape = (view["height"], samples, view["width"], samples, 4)
+    radiance = np.array(flat).reshape(shape)[::-1, ::-1]
     linear = np.clip(radiance.mean(axis=(1, 3))[..., :3], 0, 1)
     codes = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     error = np.mean((255 * codes - package.picture(view["picture"])) ** 2)
@@ -184,20 +200,24 @@ def test_three_js_draws_what_the_stage_draws(package: Package, page: Any, tmp_pa
     for path in target.iterdir():
         path.rename(tmp_path / path.name)
     views = _views(package)
-    assert _psnr(page, package, views["front"]) >= 40
+    looks = ["full", "wind", "far"] if package.parameter("look") == "full" else ["plain"]
+    found = {name: _psnr(page, package, views[name]) for name in ["front", "close", *looks]}
+    assert min(found.values()) >= 40, found
     close = views["close"]
-    assert _psnr(page, package, close) >= 40
     mirrored = [-close["state"]["light"][0], *close["state"]["light"][1:]]
     null = close | {"state": close["state"] | {"light": mirrored}}
     assert _psnr(page, package, null) < 32
+    if "wind" in looks:
+        calm = views["wind"] | {"state": views["wind"]["state"] | {"wind": 0.0}}
+        assert _psnr(page, package, calm) < 34
 
 
 @pytest.mark.reads_back("glb")
 def test_three_js_loads_the_shells_of_gltf(package: Package, page: Any, tmp_path: Path) -> None:
     """Its material is not Lambert's alone, and masks are filtered: it is like the stage's."""
     find_format("glb", "photo_fur").write(package, tmp_path / "fur.glb")
-    views = _views(package)
-    like = _psnr(page, package, views["front"], glb=True)
-    assert like >= 24
-    null = views["front"] | {"picture": views["close"]["picture"]}
+    view = _views(package)["plain"]
+    like = _psnr(page, package, view, glb=True)
+    assert like >= 22
+    null = view | {"picture": _views(package)["close"]["picture"]}
     assert _psnr(page, package, null, glb=True) < like - 6

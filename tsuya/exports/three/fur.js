@@ -5,8 +5,9 @@
 //     scene.add(fur);
 //     setFur(fur, { thickness: 0.05, lamp: 0.8, light: [-0.5, -0.6, 0.6] });
 //
-// vertex.glsl lifts the surface onto each of the layers, fragment.glsl shows of the photograph what
-// stands there. Lamps of the scene are not looked at: the fur has two of its own, and a sky.
+// vertex.glsl lifts the surface onto each of the shells, fragment.glsl shows of the photograph what
+// stands there. Lamps of the scene are not looked at: the fur has two of its own, and a sky. Give
+// setFur wind and the seconds that have passed and it moves; far away fewer shells are drawn.
 
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -19,15 +20,34 @@ const NAMES = {
   THICKNESS: "thickness",
   LAYERS: "layers",
   CODE_STEPS: "codeSteps",
+  CODES: "codeCount",
   DECAY: "decay",
+  MIDDLE: "middle",
+  WIND: "wind",
+  MOMENT: "moment",
+  GUST: "gust",
   SKY: "sky",
   HEADLIGHT: "headlight",
   LAMP: "lampRadiance",
   LAMP_TOWARDS: "lampTowards",
 };
-const UNIFORMS = `uniform float thickness, layers, codeSteps, decay, sky, headlight, lampRadiance;
+const UNIFORMS = `uniform float thickness, layers, codeSteps, codeCount, decay, middle, wind, moment, gust;
+uniform float sky, headlight, lampRadiance;
 uniform vec3 lampTowards;
 `;
+// The surface's vertices have: their names in the file, and in the shader.
+const ATTRIBUTES = {
+  normal: "outward",
+  uv: "uv",
+  _along: "along",
+  _hairlength: "hairLength",
+  _uvs: "uvs",
+  _uvthird: "uvThird",
+  _weights: "weights",
+};
+const MOST_SHELLS = 250;
+// In radii: fur is seen from no nearer when shells are counted.
+const NEAREST = 0.1;
 const VERTEX_MAIN = `void main() {
   vertexMC = vec4(position, 1.0);
   placeVertex();
@@ -56,28 +76,60 @@ export async function loadFur(folder) {
   let surface;
   gltf.scene.updateMatrixWorld();
   gltf.scene.traverse((each) => (surface = each.isMesh ? each : surface));
-  const fur = new THREE.Mesh(onceALayer(surface.geometry, about.layers), material(about, vertex, fragment, photograph));
+  const geometry = onceALayer(surface.geometry);
+  const fur = new THREE.Mesh(geometry, material(about, vertex, fragment, photograph));
   fur.applyMatrix4(surface.matrixWorld);
   fur.frustumCulled = false;
-  fur.onBeforeRender = (renderer) => {
-    const isCanvas = renderer.getRenderTarget() === null;
-    fur.material.uniforms.encode.value = isCanvas && renderer.outputColorSpace === THREE.SRGBColorSpace;
+  fur.userData = { about, detail: 1 };
+  geometry.computeBoundingBox();
+  fur.onBeforeRender = (renderer, scene, camera) => {
+    const target = renderer.getRenderTarget();
+    fur.material.uniforms.encode.value = target === null && renderer.outputColorSpace === THREE.SRGBColorSpace;
+    const height = target === null ? renderer.getDrawingBufferSize(new THREE.Vector2()).y : target.height;
+    drawShells(fur, about.look === "full" ? shellsSeen(fur, camera, height) : about.layers);
     fur.material.uniformsNeedUpdate = true;
   };
+  drawShells(fur, about.layers);
   return fur;
 }
 
 /**
  * Sets any of: thickness (mesh units), sky, headlight and lamp (radiance from everywhere, of the lamp
- * along the view, and of the other one), light (towards that one, in the mesh's own axes: z is up).
+ * along the view, and of the other one), light (towards that one, in the mesh's own axes: z is up),
+ * wind (how far tips are blown, in thicknesses) and moment (seconds since it began), of the full look.
  */
-export function setFur(fur, { thickness, sky, headlight, lamp, light }) {
+export function setFur(fur, { thickness, sky, headlight, lamp, light, wind, moment }) {
   const { uniforms } = fur.material;
-  if (sky !== undefined) uniforms.sky.value = sky;
-  if (thickness !== undefined) uniforms.thickness.value = thickness;
-  if (headlight !== undefined) uniforms.headlight.value = headlight;
-  if (lamp !== undefined) uniforms.lampRadiance.value = lamp;
+  const given = { thickness, sky, headlight, lampRadiance: lamp, wind, moment };
+  for (const [name, value] of Object.entries(given)) if (value !== undefined) uniforms[name].value = value;
   if (light !== undefined) uniforms.lampTowards.value.set(...light).normalize();
+}
+
+/** Shells that a picture of so many rows needs: fewer where the fur is few pixels thick. */
+function shellsSeen(fur, camera, height) {
+  const { about } = fur.userData;
+  const { FEWEST_SHELLS, SHELLS_A_PIXEL } = about.constants;
+  const scale = fur.matrixWorld.getMaxScaleOnAxis();
+  const middle = fur.geometry.boundingBox.getCenter(new THREE.Vector3()).applyMatrix4(fur.matrixWorld);
+  const away = middle.distanceTo(new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld));
+  const radius = scale * about.radius;
+  const nearest = camera.isPerspectiveCamera ? Math.max(away - radius, NEAREST * radius) : 1;
+  // The projection's second number is 2 over the picture's height a unit away.
+  const pixels = (scale * fur.material.uniforms.thickness.value * height * camera.projectionMatrix.elements[5]) / (2 * nearest);
+  return Math.min(about.layers, Math.max(FEWEST_SHELLS, Math.ceil(SHELLS_A_PIXEL * pixels)));
+}
+
+/** So many shells, without those above the highest hair. */
+function drawShells(fur, shells) {
+  const { about, drawn } = fur.userData;
+  if (drawn === shells) return;
+  fur.userData.drawn = shells;
+  const first = about.look === "full" ? Math.floor(about.highest * shells) + 1 : 1;
+  const layer = fur.geometry.getAttribute("layer");
+  for (let n = 0; n < MOST_SHELLS; n++) layer.setX(n, first + n);
+  layer.needsUpdate = true;
+  fur.geometry.instanceCount = shells - first + 1;
+  fur.material.uniforms.layers.value = shells;
 }
 
 async function fetched(folder, name) {
@@ -99,23 +151,28 @@ async function photographTexture(answer) {
 }
 
 /** Instances of the surface, numbered by layers, tips first. */
-function onceALayer(surface, layers) {
+function onceALayer(surface) {
   const made = new THREE.InstancedBufferGeometry();
   made.setIndex(surface.index);
   made.setAttribute("position", surface.getAttribute("position"));
-  made.setAttribute("outward", surface.getAttribute("normal"));
-  const uv = surface.getAttribute("uv").clone();
-  for (let n = 0; n < uv.count; n++) uv.setY(n, 1 - uv.getY(n)); // glTF counts v from the top
-  made.setAttribute("uv", uv);
-  const numbers = Float32Array.from({ length: layers }, (_, n) => n + 1);
-  made.setAttribute("layer", new THREE.InstancedBufferAttribute(numbers, 1));
-  made.instanceCount = layers;
+  for (const [name, shaderName] of Object.entries(ATTRIBUTES)) {
+    if (surface.hasAttribute(name)) made.setAttribute(shaderName, surface.getAttribute(name).clone());
+  }
+  const uv = made.getAttribute("uv");
+  for (let n = 0; n < (uv?.count ?? 0); n++) uv.setY(n, 1 - uv.getY(n)); // glTF counts v from the top
+  made.setAttribute("layer", new THREE.InstancedBufferAttribute(new Float32Array(MOST_SHELLS), 1));
   return made;
 }
 
-function material({ layers, thickness, attenuation, fill }, vertex, fragment, photograph) {
-  const defined = Object.entries(NAMES).map(([name, value]) => `#define ${name} ${value}\n`);
-  const head = `${HEAD}${UNIFORMS}${defined.join("")}#define COLUMNS ${fill === "columns" ? 1 : 0}\n`;
+function material(about, vertex, fragment, photograph) {
+  const { look, layers, thickness, attenuation, fill, middle, radius, constants } = about;
+  const steps = Math.floor(255 / layers);
+  const used = (name) => new RegExp(`\\b${name}\\b`).test(vertex + fragment);
+  const fixed = Object.entries(constants).map(([name, value]) => [name, Number(value).toExponential()]);
+  const defined = [...Object.entries(NAMES), ...fixed].filter(([name]) => used(name));
+  const head = `${HEAD}${UNIFORMS}${defined.map(([name, value]) => `#define ${name} ${value}\n`).join("")}
+#define COLUMNS ${fill === "columns" ? 1 : 0}
+`;
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: `${head}in vec3 position;\nvec4 vertexMC;\nuniform mat4 projectionMatrix;\n${vertex}${VERTEX_MAIN}`,
@@ -126,8 +183,13 @@ function material({ layers, thickness, attenuation, fill }, vertex, fragment, ph
       photograph: { value: photograph },
       thickness: { value: thickness },
       layers: { value: layers },
-      codeSteps: { value: Math.floor(255 / layers) },
-      decay: { value: attenuation / layers },
+      codeSteps: { value: steps },
+      codeCount: { value: steps * layers },
+      decay: { value: look === "full" ? attenuation : attenuation / layers },
+      middle: { value: middle },
+      wind: { value: 0 },
+      moment: { value: 0 },
+      gust: { value: constants.GUSTS / radius },
       sky: { value: 0 },
       headlight: { value: 1 },
       lampRadiance: { value: 0 },

@@ -1,13 +1,16 @@
-/** Fur to walk around, with thickness, layers and light to change. */
+/** Fur to walk around, in the full look or the paper's, with wind, thickness, layers and light. */
 
 import * as THREE from "three";
 import { orbit, type Camera, type Vector } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
 import type { MeshData } from "../package/mesh";
-import type { Package, Picture } from "../package/package";
-import { depthCodes, type Medium } from "./photo_fur/codes";
+import type { Package } from "../package/package";
+import { codeSteps, depthCodes, type Medium } from "./photo_fur/codes";
+import { LaidShells, type Constants, type Depths } from "./photo_fur/laid_shells";
+import { bodyOf, lay } from "./photo_fur/laying";
 import { controlsOf, withState, type Look } from "./photo_fur/look";
+import { luminanceOf, photographOf, photographTexture, setCodes } from "./photo_fur/photograph";
 import { Shells } from "./photo_fur/shells";
 
 /** From the front's left, with all of the bounds in view. */
@@ -18,6 +21,17 @@ const BACKGROUNDS: Record<string, Vector> = {
   paper: [0.86, 0.84, 0.8],
   moss: [0.05, 0.075, 0.055],
 };
+/** In radii of the mesh: fur is seen from no nearer when shells are counted. */
+const NEAREST = 0.1;
+
+/** What a package's fur is made of. */
+interface Parts {
+  plain: Shells;
+  full: LaidShells;
+  photograph: THREE.DataTexture;
+  luminance: Float32Array;
+  sphere: Bounds;
+}
 
 class Fur implements LiveView {
   readonly navigation = "orbit";
@@ -25,38 +39,38 @@ class Fur implements LiveView {
   private readonly scene = new THREE.Scene();
   private readonly backgrounds: Record<string, Vector>;
   private readonly medium: Medium;
-  private readonly attenuation: number;
   private readonly thickness: number;
-  private readonly sphere: Bounds;
+  private readonly layers: number;
   private look: Look;
   /** The number of layers that the depth codes are for. */
-  private coded: number;
-  private luminance: Float32Array | undefined;
+  private coded = 0;
+  private depths: Depths;
 
   constructor(
     private readonly pkg: Package,
     private readonly context: Context,
-    private readonly shells: Shells,
-    mesh: MeshData,
-    private readonly photograph: Picture,
+    private readonly parts: Parts,
   ) {
-    this.scene.add(shells);
+    this.scene.add(parts.plain, parts.full);
     this.backgrounds = { grey: pkg.parameter<Vector>("background"), ...BACKGROUNDS };
     this.medium = { brightest: pkg.parameter("brightest"), darkest: pkg.parameter("darkest") };
-    this.attenuation = pkg.parameter("attenuation");
     this.thickness = pkg.parameter("thickness");
-    this.sphere = sphereAbout(mesh.vertices);
-    this.coded = pkg.parameter("layers");
+    this.layers = pkg.parameter("layers");
+    this.depths = { codes: 1, attenuation: pkg.parameter("attenuation"), middle: pkg.parameter("middle"), highest: 0 };
     this.look = {
-      layers: this.coded,
+      look: pkg.parameter<Look["look"]>("look"),
+      layers: this.layers,
       thickness: 1,
       fill: pkg.parameter<Look["fill"]>("fill"),
+      wind: 0,
+      moment: null,
       sky: 0.15,
       headlight: 0.35,
       lamp: 0.75,
       light: [-0.48, -0.6, 0.64],
       background: "night",
     };
+    this.code(this.layers);
     this.home = orbit(this.bounds.centre, this.bounds.radius / HOME.sine, HOME.azimuth, HOME.elevation);
   }
 
@@ -65,7 +79,8 @@ class Fur implements LiveView {
   }
 
   get bounds(): Bounds {
-    return { ...this.sphere, radius: this.sphere.radius + this.thickness * this.look.thickness };
+    const { sphere } = this.parts;
+    return { ...sphere, radius: sphere.radius + this.thickness * this.look.thickness };
   }
 
   state(): State {
@@ -76,42 +91,60 @@ class Fur implements LiveView {
     this.look = withState(this.look, state, Object.keys(this.backgrounds));
   }
 
-  /** Depth codes for another number of layers; what they are made of is read once it is needed. */
-  async update(): Promise<void> {
-    if (this.luminance === undefined && this.look.layers !== this.coded) {
-      const luminance = await this.pkg.floats("luminance");
-      if (luminance.length !== this.photograph.width * this.photograph.height) {
-        throw new Error(`${this.pkg.name}: luminance has ${luminance.length} pixels; expected the photograph's.`);
-      }
-      this.luminance = luminance;
-      this.context.requestDraw();
-    }
-    if (this.look.layers !== this.coded) this.code(this.look.layers);
+  /** While wind blows, each frame asks for the next. */
+  update(): void {
+    if (this.look.look === "full" && this.look.wind > 0 && this.look.moment === null) this.context.requestDraw();
   }
 
   draw(renderer: THREE.WebGLRenderer, camera: Camera, width: number, height: number): void {
-    this.shells.setLook(this.look, this.coded, this.thickness * this.look.thickness, this.attenuation);
-    drawScene(renderer, this.scene, camera, [width, height], this.bounds, this.backgrounds[this.look.background]);
+    const { look, parts } = this;
+    const isFull = look.look === "full";
+    const thickness = this.thickness * look.thickness;
+    parts.full.visible = isFull;
+    parts.plain.visible = !isFull;
+    // In the plain look each layer is a step of the codes; in the full one shells are any number.
+    this.code(isFull ? this.layers : look.layers);
+    if (isFull) {
+      const shells = parts.full.shellsSeen(furPixels(camera, parts.sphere, thickness, height), look.layers);
+      const moment = look.moment ?? performance.now() / 1000;
+      parts.full.setLook(look, shells, thickness, parts.sphere.radius, moment, this.depths);
+    } else parts.plain.setLook(look, this.coded, thickness, this.depths.attenuation);
+    drawScene(renderer, this.scene, camera, [width, height], this.bounds, this.backgrounds[look.background]);
   }
 
   figures(): Record<string, number | string> {
+    const { plain, full, photograph } = this.parts;
+    const { width, height } = photograph.image as { width: number; height: number };
     return {
       "draw calls": 1,
-      triangles: this.shells.triangles,
+      triangles: (this.look.look === "full" ? full : plain).triangles,
       "thickness, mesh units": Number((this.thickness * this.look.thickness).toPrecision(4)),
-      "photograph on the graphics card, bytes": 4 * this.photograph.width * this.photograph.height,
+      "photograph on the graphics card, bytes": 4 * width * height,
     };
   }
 
   dispose(): void {
-    this.shells.dispose();
+    this.parts.plain.dispose();
+    this.parts.full.dispose();
   }
 
   private code(layers: number): void {
+    if (layers === this.coded) return;
     const dropped = this.pkg.parameter<string>("tails") === "dropped";
-    this.shells.setCodes(depthCodes(this.luminance as Float32Array, this.medium, layers, dropped));
+    const codes = depthCodes(this.parts.luminance, this.medium, layers, dropped);
+    setCodes(this.parts.photograph, codes);
     this.coded = layers;
+    this.depths.codes = codeSteps(layers) * layers;
+    this.depths.highest = codes.reduce((least, code) => Math.min(least, code), 255) / this.depths.codes;
   }
+}
+
+/** Pixels of a picture that fur so thick takes where the sphere about the mesh is nearest. */
+function furPixels({ position, view_angle, height: high }: Camera, sphere: Bounds, thickness: number, height: number): number {
+  if (high !== null) return (thickness * height) / high;
+  const away = Math.hypot(...position.map((axis, i) => axis - sphere.centre[i]));
+  const nearest = Math.max(away - sphere.radius, NEAREST * sphere.radius);
+  return (thickness * height) / (2 * Math.tan((view_angle * Math.PI) / 360) * nearest);
 }
 
 function sphereAbout(vertices: Float32Array): Bounds {
@@ -125,17 +158,48 @@ function sphereAbout(vertices: Float32Array): Bounds {
   return { centre: centre.toArray(), radius };
 }
 
+async function partsOf(pkg: Package): Promise<Parts> {
+  const array = async <T>(name: string) => (await pkg.array(name)) as T;
+  const [mesh, photograph, codes, middles, places, directions, opaque] = await Promise.all([
+    pkg.mesh("mesh"),
+    photographOf(pkg),
+    array<Uint8Array>("lie"),
+    array<Uint32Array>("patch_vertex"),
+    array<Float32Array>("patch_place"),
+    array<Float32Array>("patch_direction"),
+    pkg.has("opaque") ? pkg.picture("opaque") : undefined,
+  ]);
+  const count = mesh.vertices.length / 3;
+  const [patches, pixels] = [middles.length, photograph.width * photograph.height];
+  const isWhole =
+    codes.length === 2 * count &&
+    places.length === 2 * patches &&
+    directions.length === patches &&
+    middles.every((vertex) => vertex < count) &&
+    (!opaque || opaque.data.length === pixels);
+  if (!mesh.normals || !mesh.uvs || !isWhole) {
+    throw new Error(`${pkg.name}: expected normals, texture coordinates, hair for each vertex and patches on them.`);
+  }
+  const whole = mesh as Required<MeshData>;
+  const body = bodyOf(whole, codes, pkg.parameter<number[]>("backwards"));
+  const spacing = pkg.parameter("patch_spacing");
+  const width = pkg.parameter("photograph_width");
+  const laying = lay(body, { middles, places, directions, spacing, width });
+  const lengths = Float32Array.from(codes.subarray(count), (code) => code / 255);
+  const image = photographTexture(photograph);
+  return {
+    plain: new Shells(whole, image),
+    full: new LaidShells(whole, body, lengths, laying, image, pkg.parameter<Constants>("constants")),
+    photograph: image,
+    luminance: luminanceOf(photograph, opaque),
+    sphere: sphereAbout(mesh.vertices),
+  };
+}
+
 /** The system's live view. */
 const viewer: SystemViewer = {
   name: "photo_fur",
-  async make(pkg, context) {
-    const [mesh, photograph] = await Promise.all([pkg.mesh("mesh"), pkg.picture("photograph")]);
-    if (!mesh.normals || !mesh.uvs || photograph.channels !== 4 || !(photograph.data instanceof Uint8Array)) {
-      throw new Error(`${pkg.name}: expected normals, texture coordinates and a photograph of 4 channels of bytes.`);
-    }
-    const shells = new Shells(mesh as Required<MeshData>, photograph as Picture<Uint8Array>);
-    return new Fur(pkg, context, shells, mesh, photograph);
-  },
+  make: async (pkg, context) => new Fur(pkg, context, await partsOf(pkg)),
 };
 
 export default viewer;

@@ -5,11 +5,17 @@ import { MOST_LAYERS } from "./codes";
 
 /** Everything that can be set. */
 export interface Look {
+  /** Patches along the lie and light on hairs, or the paper's shells. */
+  look: "full" | "plain";
   layers: number;
   /** In the package's thicknesses. */
   thickness: number;
-  /** Hairs stand in all layers below their own, or in their own alone. */
+  /** Of the plain look: hairs stand in all layers below their own, or in their own alone. */
   fill: "columns" | "bands";
+  /** How far tips are blown, in thicknesses; of the full look, as is what follows. */
+  wind: number;
+  /** Seconds since the wind began; null: the time runs. */
+  moment: number | null;
   /** Radiance from everywhere. */
   sky: number;
   /** Radiance of the lamp along the view. */
@@ -22,6 +28,7 @@ export interface Look {
   background: string;
 }
 
+const LOOKS = ["full", "plain"] as const;
 const FILLS = ["columns", "bands"] as const;
 const RANGES: Record<string, [number, number]> = {
   layers: [1, 64],
@@ -29,6 +36,7 @@ const RANGES: Record<string, [number, number]> = {
   sky: [0, 1],
   headlight: [0, 1.5],
   lamp: [0, 1.5],
+  wind: [0, 1.5],
 };
 
 /** The controls, for backgrounds by name. */
@@ -40,10 +48,12 @@ export function controlsOf(look: Look, backgrounds: readonly string[]): Control[
   const options = (names: readonly string[]) =>
     names.map((value) => ({ value, label: value[0].toUpperCase() + value.slice(1) }));
   const layers = { ...slider("layers", "Layers", 1), max: Math.max(RANGES.layers[1], look.layers) } as Control;
+  const isFull = look.look === "full";
   return [
+    { kind: "choice", name: "look", label: "Look", options: options(LOOKS) },
     slider("thickness", "Thickness", 0.05, "×"),
     layers,
-    { kind: "choice", name: "fill", label: "Fill", options: options(FILLS) },
+    isFull ? slider("wind", "Wind", 0.05, "×") : { kind: "choice", name: "fill", label: "Fill", options: options(FILLS) },
     { kind: "direction", name: "light", label: "Lamp" },
     slider("lamp", "Lamp's light", 0.05),
     slider("headlight", "Light along the view", 0.05),
@@ -57,7 +67,9 @@ export function withState(look: Look, state: State, backgrounds: readonly string
   const set = { ...look };
   for (const [name, value] of Object.entries(state)) {
     if (name === "layers") set.layers = wholeNumber(name, value);
-    else if (name === "thickness" || name === "sky" || name === "headlight" || name === "lamp") set[name] = amount(name, value);
+    else if (name === "thickness" || name === "sky" || name === "headlight" || name === "lamp" || name === "wind") set[name] = amount(name, value);
+    else if (name === "moment") set.moment = value === null ? null : amount(name, value);
+    else if (name === "look") set.look = one(name, value, LOOKS);
     else if (name === "fill") set.fill = one(name, value, FILLS);
     else if (name === "background") set.background = one(name, value, backgrounds);
     else if (name === "light") set.light = unit(name, value);

@@ -1,10 +1,8 @@
-/** The shells in one draw call: the surface once a layer, lifted in the vertex shader. */
+/** The plain look in one draw call: the surface once a layer, lifted in the vertex shader. */
 
 import * as THREE from "three";
 import { Surface } from "../../drawing/surface";
-import { texture } from "../../drawing/textures";
 import type { MeshData } from "../../package/mesh";
-import type { Picture } from "../../package/package";
 import { codeSteps, MOST_LAYERS } from "./codes";
 import type { Look } from "./look";
 
@@ -23,11 +21,9 @@ const NAMES = {
 /** The fur of a surface: put it into a `THREE.Scene`. */
 export class Shells extends Surface {
   private columns = true;
-  private readonly photograph: THREE.DataTexture;
 
   /** photograph: colours as sRGB codes, depth codes in alpha. */
-  constructor(mesh: Required<MeshData>, photograph: Picture<Uint8Array>) {
-    const image = texture(photograph, { wrap: "mirrored", srgb: true });
+  constructor(mesh: Required<MeshData>, photograph: THREE.DataTexture) {
     super({
       vertices: mesh.vertices,
       triangles: mesh.triangles,
@@ -35,7 +31,7 @@ export class Shells extends Surface {
       vertex: "fur_shell_vertex.glsl",
       fragment: "fur_shell_fragment.glsl",
       values: { ...NAMES, COLUMNS: true },
-      textures: { photograph: image },
+      textures: { photograph },
       uniforms: {
         codeSteps: { type: "float", value: 1 },
         decay: { type: "float", value: 0 },
@@ -47,7 +43,6 @@ export class Shells extends Surface {
         lampTowards: { type: "vec3", value: new THREE.Vector3(0, 0, 1) },
       },
     });
-    this.photograph = image;
     this.geometry = onceALayer(this.geometry);
   }
 
@@ -55,16 +50,6 @@ export class Shells extends Surface {
   get triangles(): number {
     const { index, instanceCount } = this.geometry as THREE.InstancedBufferGeometry;
     return (index!.count / 3) * instanceCount;
-  }
-
-  /** Other depth codes, row 0 at the top. */
-  setCodes(codes: Uint8Array): void {
-    const { width, height, data } = this.photograph.image as { width: number; height: number; data: Uint8Array };
-    for (let row = 0; row < height; row++) {
-      const from = (height - 1 - row) * width;
-      for (let column = 0; column < width; column++) data[4 * (row * width + column) + 3] = codes[from + column];
-    }
-    this.photograph.needsUpdate = true;
   }
 
   /** Sets a look, for the number of layers that the codes are for; thickness: in scene units. */
@@ -86,7 +71,7 @@ export class Shells extends Surface {
 }
 
 /** A geometry as instances, numbered by layers from the tips: what is in front is drawn first. */
-function onceALayer(geometry: THREE.BufferGeometry): THREE.InstancedBufferGeometry {
+export function onceALayer(geometry: THREE.BufferGeometry): THREE.InstancedBufferGeometry {
   const made = new THREE.InstancedBufferGeometry();
   made.setIndex(geometry.index);
   for (const [name, attribute] of Object.entries(geometry.attributes)) made.setAttribute(name, attribute);
