@@ -18,6 +18,7 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import square
 from pipelines.photo_fur import laid_fur
 from pipelines.photo_fur.figures import laid_lie_error, strand_scale_spread
+from pipelines.photo_fur.hair_length import hair_lengths
 from pipelines.photo_fur.laid_fur import Hair, laid_surface
 from pipelines.photo_fur.laying import (
     REACH,
@@ -29,6 +30,7 @@ from pipelines.photo_fur.laying import (
     least_spacing,
 )
 from pipelines.photo_fur.lie import guides_backwards, lie_field, nose_to_tail
+from pipelines.photo_fur.packed_fur import Laid
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.photograph_lie import (
     PhotographLie,
@@ -36,7 +38,7 @@ from pipelines.photo_fur.photograph_lie import (
     photograph_lie,
     pieces_of,
 )
-from pipelines.photo_fur.shells import mesh_radius
+from pipelines.photo_fur.shells import ShellMesh, make_shell_mesh, mesh_radius
 from pipelines.photo_fur.stage_view import FurLight, fur_texture, live_surface
 
 _LAYERS = 15
@@ -84,26 +86,35 @@ def _sheet(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
     }
 
 
-def _body(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
-    body = eared_body()
-    points, radius = body.vertices, mesh_radius(body.vertices)
-    guides = guides_backwards(body.normals, nose_to_tail(points), 0.5)
-    tangents = lie_field(points, body.normals, body.triangles, guides, 0.12 * radius).tangents
-    width = 0.8 * radius
-    spacing = max(
-        disc_radius(lie.direction.shape) / REACH * width, least_spacing(points, body.triangles)
-    )
+def laid_over_body(photograph: FurPhotograph) -> tuple[ShellMesh, Laid]:
+    """The eared body, and a square photograph on it, as the graph's defaults have it."""
+    mesh = make_shell_mesh(eared_body(), _LAYERS)
+    skin, radius = mesh.vertices[-1], mesh_radius(mesh.vertices[-1])
+    backwards = nose_to_tail(skin)
+    guides = guides_backwards(mesh.normals, backwards, 0.5)
+    tangents = lie_field(skin, mesh.normals, mesh.triangles, guides, 0.12 * radius).tangents
+    lie, width = photograph_lie(photograph.luminance), 0.8 * radius
+    usual = disc_radius(lie.direction.shape) / REACH * width
+    spacing = max(usual, least_spacing(skin.astype(np.float64), mesh.triangles))
     pieces = pieces_of(lie, REACH * spacing / width, None, photograph.radiance)
-    haired = Body(points, body.triangles, tangents, body.normals)
-    patches = choose_patches(haired, pieces, spacing=spacing)
-    laying = lay(haired, patches, spacing=spacing, width=width)
+    body = Body(skin, mesh.triangles, tangents, mesh.normals)
+    patches = choose_patches(body, pieces, spacing=spacing)
+    hair = Hair(tangents, hair_lengths(skin, mesh.normals, mesh.triangles))
+    return mesh, Laid(hair, backwards, patches, spacing, width)
+
+
+def _body(photograph: FurPhotograph, lie: PhotographLie) -> dict[str, Any]:
+    body, (mesh, laid) = eared_body(), laid_over_body(photograph)
+    skin, tangents = mesh.vertices[-1], laid.hair.tangents
+    haired = Body(skin, mesh.triangles, tangents, mesh.normals)
+    laying = lay(haired, laid.patches, spacing=laid.spacing, width=laid.width)
     layings = {"": laying, "_plain": laid_by_coordinates(body)}
-    found: dict[str, Any] = {"patches": len(patches.middles)}
+    found: dict[str, Any] = {"patches": len(laid.patches.middles)}
     found |= _frame_ratio(photograph, body, tangents, laying)
     for name, each in layings.items():
-        found[f"strand_scale_spread{name}"] = strand_scale_spread(points, each)
+        found[f"strand_scale_spread{name}"] = strand_scale_spread(skin, each)
         found[f"lie_error_deg{name}"] = laid_lie_error(
-            points, tangents, each, lie.direction, lie.coherence
+            skin, tangents, each, lie.direction, lie.coherence
         )
     return found
 

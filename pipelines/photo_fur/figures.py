@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.colour import to_8bit
 from pipelines.photo_fur.attenuation import Attenuation, Tails
 from pipelines.photo_fur.laying import Laying
 
@@ -136,24 +135,6 @@ def outward_share(shells: NDArray[np.floating], triangles: NDArray[np.integer]) 
     hair = (shells[0].astype(np.float64) - surface)[triangles].sum(axis=1)
     seen = seen_from_outside(surface, triangles, 1 << 14)
     return float(np.mean(np.einsum("ni,ni->n", hair[seen.triangle], seen.direction) < 0))
-
-
-def top_view_rmse(
-    picture: NDArray[np.uint8],
-    radiance: NDArray[np.floating],
-    opaque: NDArray[np.bool_] | None = None,
-) -> float:
-    """RMSE in [0, 1] between the picture from above and the photograph, as 8-bit sRGB.
-
-    The picture has one pixel a texel, or a square of pixels each. Where the photograph is not
-    ``opaque`` the picture shows what is behind the fur, which is not looked at.
-    """
-    times = len(picture) // len(radiance)
-    expected = to_8bit(radiance).repeat(times, axis=0).repeat(times, axis=1)
-    step = picture.astype(np.float64) - expected
-    if opaque is not None:
-        step = step[opaque.repeat(times, axis=0).repeat(times, axis=1)]
-    return float(np.sqrt(np.mean((step / 255.0) ** 2)))
 
 
 def guide_error(guides: NDArray[np.floating], tangents: NDArray[np.floating]) -> float:

@@ -24,37 +24,42 @@ from pipelines.photo_fur.laying import Laying
 from pipelines.photo_fur.shells import mesh_radius
 from pipelines.photo_fur.stage_view import FurLight
 
-BEND = 0.5
+BEND = 0.2
 """How far tips lean along the lie, in thicknesses."""
 HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
-SPREAD = 1.4
+SPREAD = 1.9
 """How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
 true ones least are nearer to their mean, and of those an outline would be smooth."""
+BIAS = -0.5
+"""Of the photograph's mipmaps: hairs are thin, and a blur of them has no outline."""
 GUSTS = 4.0
 """Radians of a gust over a mesh radius."""
-FEWEST_SHELLS, SHELLS_A_PIXEL = 4, 2.5
+FEWEST_SHELLS, SHELLS_A_PIXEL = 5, 1.1
+"""With these SSIM of pictures with all shells and with few stays above 0.98 (`lod_ssim`)."""
 LAID_SHADERS = ("fur_laid_vertex.glsl", "fur_laid_fragment.glsl")
 """Of vertices and fragments of fur laid in patches."""
 
 
 SHADING = {
-    "CONTRAST": 0.0,
-    "DIM": 0.2,
-    "MOST_DIM": 1.7,
-    "STANDS": 0.15,  # how far down from its own depth a hair stands, thicknesses
     "HOT_SPOT": 0.35,  # radians from the view within which a lamp lights all that is seen
-    "SLANT": 0.1,  # lengths of attenuation that slanting light has more of than light from above
-    "MOST_SLANT": 0.8,
+    "CONTRAST": 0.3,  # by how much more light from aside tells heights apart than light from above
+    "SLANT": 0.34,  # the same, for each length of attenuation that slanting light has more of
+    "MOST_SLANT": 1.7,
+    "DIM": 0.35,  # of slanting light, how much of its mean shadows take
+    "MOST_DIM": 1.4,
     "BELOW": 0.5,  # how fast a hair darkens below its tip, of the medium's attenuation
-    "DUSK": 0.35,  # cosine from which on, before and behind the horizon, a lamp fades
-    "ASIDE": 0.85,  # of a lamp's light, what shadows of hair on hair leave
+    "DUSK": 0.275,  # cosine from which on, before and behind the horizon, a lamp fades
+    "ASIDE": 0.88,  # of a lamp's light, what shadows of hair on hair leave
     "FIBRE": 0.5,  # power of the fibre's light
-    "TILT": 2.0,  # of hair, tangent of the angle from upright
+    "TILT": 1.8,  # of hair, tangent of the angle from upright
+    "STANDS": 0.225,  # how far down from its own depth a hair stands, thicknesses
+    "EDGE": 0.3,  # what of that is left where the surface is seen from aside,
+    "EDGE_TO": 0.45,  # below this cosine
 }
-"""How light falls on hair, fitted to a traced pelt that no figure is of."""
+"""How light falls on hair and how it stands, fitted to a traced pelt that no figure is of."""
 
 
 class Hair(NamedTuple):
@@ -160,7 +165,7 @@ def laid_surface(
             "uvThird": each(uvs[:, 2]),
             "weights": each(laying.weights),
         },
-        textures={"photograph": texture(image, wrap=wrap, srgb=True)},
+        textures={"photograph": texture(image, wrap=wrap, mipmap=True, srgb=True)},
         shader=surface_shader(
             *LAID_SHADERS,
             CODES=float(code_steps(fur.layers) * fur.layers),
@@ -187,6 +192,7 @@ def constants() -> dict[str, Any]:
         "BEND": BEND,
         "HEIGHT_OF_WEIGHT": HEIGHT_OF_WEIGHT,
         "GLOSS": GLOSS,
+        "BIAS": BIAS,
         "SPREAD": SPREAD,
         **SHADING,
     }

@@ -165,7 +165,7 @@ class FurScene:
         )
         (whole,) = self.cameras([_CLOSE_VIEW], size[1] / size[0])
         sides = self.cameras(ROUND_VIEWS, size[1] / size[0])
-        close, near, far = (_nearer(whole, share) for share in (_CLOSE, _NEAR, _FAR))
+        close, near, far = (nearer(whole, share) for share in (_CLOSE, _NEAR, _FAR))
         taken = [
             *((name, own, camera) for name, camera in zip(_SIDES, sides, strict=True)),
             ("close", lit, close),
@@ -250,7 +250,7 @@ def _other(fill: Fill) -> Fill:
     return "bands" if fill == "columns" else "columns"
 
 
-def _nearer(camera: Camera, share: float) -> Camera:
+def nearer(camera: Camera, share: float) -> Camera:
     """A camera at a share of its distance to what it looks at."""
     x, y, z = (
         goal + share * (place - goal)

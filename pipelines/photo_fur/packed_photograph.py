@@ -6,6 +6,7 @@ Depth follows from brightness (Eq. 1), so nothing but the colours has to be stor
 from __future__ import annotations
 
 import io
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +43,18 @@ def photograph_psnr_db(
 ) -> float:
     """Of an AVIF file against the photograph (y, x, 3) in linear light, in 8-bit codes, where there
     is fur. Raises ValueError for what is no AVIF file."""
-    codes = _codes(content).astype(np.float64)
-    error = (codes - to_8bit(radiance)) ** 2
+    return _psnr_db(_codes(content), to_8bit(radiance), opaque)
+
+
+def one_colour_psnr_db(radiance: NDArray[np.floating], opaque: NDArray[np.bool_] | None) -> float:
+    """The same of the colour that is nearest to all of it: what knows nothing has so much."""
+    codes = to_8bit(radiance).astype(np.float64)
+    seen = codes.reshape(-1, 3) if opaque is None else codes[opaque]
+    return _psnr_db(np.broadcast_to(seen.mean(axis=0), codes.shape), codes, opaque)
+
+
+def _psnr_db(one: NDArray[Any], other: NDArray[Any], opaque: NDArray[np.bool_] | None) -> float:
+    error = (one.astype(np.float64) - other) ** 2
     mean = float((error if opaque is None else error[opaque]).mean())
     return float(10 * np.log10(255**2 / max(mean, 1e-9)))
 

@@ -19,7 +19,7 @@ from pipelines.photo_fur import (
     frames,
     laying,
     lie,
-    live_parts,
+    packed_fur,
     photograph,
     photograph_lie,
     shells,
@@ -185,10 +185,9 @@ def _left_lit(right: Callable[..., Any], radiance: Any, fur: Any) -> suitability
     return suitability.EvenlyLit(radiance * slope, 0.0)
 
 
-def _half_dropped(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+def _shuffled_code(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     code = right(*arguments, **options)
-    code[::2] = attenuation.DROPPED
-    return code
+    return np.random.default_rng(0).permutation(code.ravel()).reshape(code.shape)
 
 
 def _linear_layers(
@@ -287,13 +286,22 @@ REGRESSIONS = (
     Regression("guide_error", lie, "lie_field", _sideways_field, PELT_KEYS),
     Regression("strand_scale_spread", laying, "lay", _drawn_out_patches, PELT_KEYS),
     Regression("lie_error", photograph_lie, "pieces_of", _turned_pieces, PELT_KEYS),
-    Regression("top_view_rmse", stage_view, "depth_code", _half_dropped, KEYS),
+    Regression("aslant_rmse", stage_view, "depth_code", _shuffled_code, KEYS),
     Regression("least_coverage", stage_view, "depth_code", _dropped, KEYS),
     Regression(
         "mismatches",
-        live_parts,
-        "luminance_part",
-        lambda right, photo: right(photo) * np.float32(1.0001),
+        packed_fur,
+        "lie_codes",
+        lambda right, *arguments: right(*arguments) + np.uint8(1),
+        KEYS,
+    ),
+    Regression(
+        "photograph_gain_db",
+        packed_fur,
+        "packed_photograph",
+        lambda right, photograph, quality: right(
+            photograph._replace(radiance=photograph.radiance[::-1]), quality
+        ),
         KEYS,
     ),
     Regression(

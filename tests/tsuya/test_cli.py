@@ -68,7 +68,7 @@ def test_a_run_reports_figures_sizes_and_versions(made: dict[str, Any], home: Pa
         "photo_fur/fur_package/square.grass",
     }
     frames = assets["photo_fur/fur_frames/square.grass"]
-    assert frames["figures"]["top_view_rmse"] <= 0.02
+    assert frames["figures"]["aslant_rmse"] <= 0.005
     folder = Path(tsuya("path", "photo_fur/fur_frames/square.grass").stdout.strip())
     assert folder.name == frames["version"]
     assert frames["bytes"] == sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
@@ -95,7 +95,7 @@ def test_a_second_run_says_in_a_table_that_all_is_current(made: dict[str, Any]) 
     result = tsuya("run", "photo_fur", "--photo", "grass", "--mesh", "square")
     assert result.exit_code == 0
     assert "0 made, 8 current already" in result.stdout
-    assert "top_view_rmse" in result.stdout
+    assert "aslant_rmse" in result.stdout
 
 
 def test_the_users_photograph_and_mesh_are_taken_in(

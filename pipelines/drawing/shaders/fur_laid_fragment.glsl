@@ -15,8 +15,8 @@ flat in vec3 lampOut;
 // Of what is shown so far and of another patch the higher hair; height is that of the one shown.
 // A patch's weight counts as so many thicknesses.
 vec4 higherHair(vec4 shown, vec2 at, float weight, inout float height) {
+  vec4 texel = texture(photograph, at, BIAS);
   if (weight < 0.02) return shown;
-  vec4 texel = texture(photograph, at);
   float here = weight * HEIGHT_OF_WEIGHT - texel.a;
   if (here <= height) return shown;
   height = here;
@@ -53,7 +53,8 @@ float glint(vec3 tangent, vec3 light, vec3 view) {
 }
 
 // Heights are drawn further from their mean than brightness tells them, by SPREAD, and a hair stands
-// STANDS deep, for it lies rather than stands: below it others are seen.
+// STANDS deep, for it lies rather than stands: below it others are seen, and from aside, as on an
+// outline, what is behind it.
 vec3 surfaceColour() {
   float height = -10.0;
   vec4 texel = higherHair(vec4(0.0, 0.0, 0.0, 1.0), uvsOut.xy, weightsOut.x, height);
@@ -61,11 +62,13 @@ vec3 surfaceColour() {
   texel = higherHair(texel, uvThirdOut, weightsOut.z, height);
   float own = depthCode(texel.a) / CODES, here = layerOut / LAYERS;
   float below = here - clamp(MIDDLE + SPREAD * (own - MIDDLE), 0.0, 0.999);
-  bool gap = below > max(STANDS, 1.0 / LAYERS) && layerOut < LAYERS;
-  if (own >= 1.0 || below <= 0.0 || gap) discard;
   vec3 up = normalize(outwardOut), view = vec3(0.0, 0.0, 1.0);
+  float stands = STANDS * mix(EDGE, 1.0, smoothstep(0.0, EDGE_TO, abs(up.z)));
+  bool gap = below > max(stands, 1.0 / LAYERS) && layerOut < LAYERS;
+  if (own >= 1.0 || below <= 0.0 || gap) discard;
   vec3 tangent = normalize(alongOut * TILT + up);
-  float darker = DECAY * below, depth = DECAY * own + darker;
+  // What the uppermost shell shows of a hair is its tip, however far shells are apart.
+  float darker = DECAY * max(below - 1.0 / LAYERS, 0.0), depth = DECAY * own + darker;
   float lamp = lampLight(tangent, lampOut, view, up, depth, darker);
   float lamps = HEADLIGHT * lampLight(tangent, view, view, up, depth, darker) + LAMP * lamp;
   return texel.rgb * (SKY * exp(-BELOW * darker) + lamps)

@@ -28,7 +28,8 @@ vec3 blown(vec3 at) {
 }
 
 void placeVertex() {
-  float height = 1.0 - layer / LAYERS;
+  // In the middle of what it stands for, but for the skin: so hair is as long of few shells.
+  float height = layer < LAYERS ? 1.0 - (layer - 0.5) / LAYERS : 0.0;
   vec3 lean = BEND * along + blown(vertexMC.xyz);
   vec3 lifted = THICKNESS * hairLength * (height * outward + height * height * lean);
   gl_Position = MCDCMatrix * vec4(vertexMC.xyz + lifted, 1.0);

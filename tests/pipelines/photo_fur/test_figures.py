@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from pipelines.drawing.colour import to_8bit
 from pipelines.photo_fur.attenuation import Attenuation, Tails, make_shell_stack
 from pipelines.photo_fur.figures import (
     clipped_share,
@@ -24,7 +21,6 @@ from pipelines.photo_fur.figures import (
     outward_share,
     partition_error,
     step_error,
-    top_view_rmse,
 )
 from pipelines.photo_fur.shells import shell_vertices
 
@@ -141,7 +137,7 @@ def test_step_error_is_the_largest_distance_from_equation_3() -> None:
 # ---- the pictures ----------------------------------------------------------------------------
 
 
-def test_transparent_pixels_must_be_in_no_layer_and_are_not_looked_at_from_above() -> None:
+def test_transparent_pixels_must_be_in_no_layer() -> None:
     luminance = np.linspace(0.2, 0.9, 100).reshape(10, 10)
     opaque = np.ones((10, 10), bool)
     opaque[:2] = False
@@ -153,34 +149,6 @@ def test_transparent_pixels_must_be_in_no_layer_and_are_not_looked_at_from_above
     assert partition_error(wrong, masks, opaque) == 0.2
     assert interval_error(wrong, luminance, boundaries, "end layers", opaque) == 0.2
     assert interval_error(layer, luminance, boundaries, "end layers") == 0.2
-    picture = np.zeros((10, 10, 3), np.uint8)
-    light = np.zeros((10, 10, 3))
-    light[:2] = 1.0
-    assert top_view_rmse(picture, light, opaque) == 0.0
-    assert top_view_rmse(picture, light) > 0.4
-
-
-def test_top_view_rmse_is_the_rmse_of_the_codes() -> None:
-    rng = np.random.default_rng(15)
-    radiance = rng.random((4, 5, 3)).astype(np.float32)
-    picture = rng.integers(0, 256, (4, 5, 3), dtype=np.uint8)
-    squares = [
-        ((int(a) - int(b)) / 255) ** 2
-        for a, b in zip(picture.ravel(), to_8bit(radiance).ravel(), strict=True)
-    ]
-    expected = math.sqrt(sum(squares) / len(squares))
-    assert top_view_rmse(picture, radiance) == pytest.approx(expected, rel=1e-12)
-    assert top_view_rmse(to_8bit(radiance), radiance) == 0.0
-    white, black = np.ones((2, 2, 3), np.float32), np.zeros((2, 2, 3), np.uint8)
-    assert top_view_rmse(black, white) == 1.0
-
-
-def test_a_picture_of_several_pixels_a_texel_is_compared_with_each() -> None:
-    radiance = np.random.default_rng(16).random((4, 5, 3)).astype(np.float32)
-    picture = to_8bit(radiance).repeat(3, axis=0).repeat(3, axis=1)
-    assert top_view_rmse(picture, radiance) == 0.0
-    picture[0, 0, 0] ^= 255
-    assert top_view_rmse(picture, radiance) > 0.0
 
 
 def test_mean_brightness_is_that_of_the_fur_alone() -> None:

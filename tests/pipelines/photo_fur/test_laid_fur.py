@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +12,18 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.stage import Stage, orbit
 from pipelines.geometry.shapes import sphere, square
 from pipelines.photo_fur import figures
-from pipelines.photo_fur.laid_fur import BEND, Hair, LaidFur, laid_fur, laid_surface
+from pipelines.photo_fur.laid_fur import (
+    BEND,
+    SPREAD,
+    Hair,
+    LaidFur,
+    Wind,
+    highest_depth,
+    laid_fur,
+    laid_surface,
+    middle_depth,
+    shells_seen,
+)
 from pipelines.photo_fur.laying import Body, Laying, Piece, choose_patches, lay
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.stage_view import FurLight, fur_texture
@@ -170,3 +183,58 @@ def test_reach_holds_all_that_is_drawn() -> None:
         4,
     )
     assert np.linalg.norm(fur.reach, axis=1).max() == pytest.approx(1 + 0.1 * (1 + BEND), abs=1e-5)
+
+
+def seen_from(photo: FurPhotograph, elevation: float, **options: Any) -> NDArray[np.float64]:
+    """Linear radiance (y, x, 3) of a flat fur under an even sky."""
+    points, laying = flat_laying(np.zeros(50))
+    fur = flat_fur(points, laying)
+    image = fur_texture(photo, LAYERS, tails="end layers")
+    middle = tuple(points.mean(axis=0).tolist())
+    with Stage(96, 96, background=(0.0, 0.0, 0.0), supersampling=2) as stage:
+        sky = FurLight(sky=1.0, headlight=0.0)
+        stage.add(laid_surface(fur, image, photo.attenuation, sky, **options))
+        stage.look(orbit(middle, 5.0, -90.0, elevation, height=0.5 * float(np.ptp(points[:, 0]))))
+        return decode_srgb(stage.frame().astype(np.float64) / 255)
+
+
+def test_wind_blows_tips_and_not_the_skin() -> None:
+    """More wind moves more, another moment is another gust, and hair on the skin stays: of a
+    photograph that is dark all over, at the depth of the skin, nothing moves."""
+    photo = photograph()
+    calm = seen_from(photo, 60.0)
+    np.testing.assert_array_equal(seen_from(photo, 60.0, wind=Wind(0.0, 3.0)), calm)
+    breeze, gale = (
+        np.abs(seen_from(photo, 60.0, wind=Wind(strength, 1.0)) - calm).mean()
+        for strength in (0.2, 1.5)
+    )
+    assert gale > 1.5 * breeze > 0.002
+    later = seen_from(photo, 60.0, wind=Wind(1.5, 2.5))
+    assert np.abs(later - seen_from(photo, 60.0, wind=Wind(1.5, 1.0))).mean() > 0.002
+    skin = photo._replace(luminance=np.full_like(photo.luminance, photo.attenuation.darkest))
+    still, blown = (seen_from(skin, 60.0, wind=Wind(strength, 1.0)) for strength in (0.0, 1.5))
+    assert np.abs(blown - still).mean() < 0.1 * gale
+
+
+def test_few_shells_are_as_bright_as_many() -> None:
+    photo = photograph()
+    many, some, few = (seen_from(photo, 50.0, shells=shells).mean() for shells in (36, 12, 5))
+    assert few == pytest.approx(some, rel=0.1)
+    assert many == pytest.approx(some, rel=0.1)
+
+
+def test_depths_of_codes() -> None:
+    codes = np.zeros((2, 2, 4), np.uint8)
+    codes[..., 3] = [[63, 126], [189, 255]]  # quarters of 252; 255 is no hair
+    assert middle_depth(codes, 4) == pytest.approx(0.5)
+    assert highest_depth(codes, 4) == pytest.approx(max(0.0, 0.5 - SPREAD * 0.25))
+    codes[..., 3] = 255
+    assert middle_depth(codes, 4) == 0.5
+
+
+def test_fewer_shells_are_seen_of_thinner_fur() -> None:
+    found = [shells_seen(pixels, 15) for pixels in (0.1, 3, 6, 9, 12, 15, 1000)]
+    assert found == sorted(found)
+    assert found[0] >= 3
+    assert found[-1] == 15
+    assert shells_seen(1000, 2) == 2

@@ -8,20 +8,21 @@ import numpy as np
 import pytest
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
-from pipelines.geometry.shapes import sphere
+from pipelines.drawing.stage import Camera
 from pipelines.photo_fur.frames import BACKGROUND
+from pipelines.photo_fur.laid_fur import shells_seen
 from pipelines.photo_fur.live_parts import (
     LAMP,
     NIGHT,
     FurLook,
     FurScene,
+    fur_pixels,
     input_picture,
-    luminance_part,
+    nearer,
     shell_sources,
 )
-from pipelines.photo_fur.shells import make_shell_mesh
-from pipelines.photo_fur.stage_view import Fill, FurLight
-from tests.fur_packages import tufts
+from pipelines.photo_fur.stage_view import Fill, FurLight, Look
+from tests.fur_packages import packed_tufts, tufts
 
 SIZE = (96, 128)
 LIT = FurLight(headlight=0.4, lamp=0.9, light=LAMP)
@@ -29,8 +30,8 @@ LIT = FurLight(headlight=0.4, lamp=0.9, light=LAMP)
 
 @pytest.fixture(scope="module")
 def scene() -> FurScene:
-    mesh = make_shell_mesh(sphere(16), 6, thickness=0.2, repeats=0.4)
-    return FurScene(tufts(), mesh, "end layers")
+    packed = packed_tufts(thickness=0.2)
+    return FurScene(tufts(), packed.mesh, packed.fur(), "end layers")
 
 
 def _psnr(one: np.ndarray, other: np.ndarray) -> float:
@@ -41,7 +42,9 @@ def _psnr(one: np.ndarray, other: np.ndarray) -> float:
 @pytest.mark.parametrize("fill", ["columns", "bands"])
 def test_shells_that_light_themselves_are_the_stages(scene: FurScene, fill: Fill) -> None:
     """VTK offsets nothing and lights nothing here: the shader does both."""
-    camera = scene.reference_views(fill, (12, 16))[4].camera  # close: all of the picture is fur
+    camera = scene.reference_views("plain", fill, (12, 16))[
+        4
+    ].camera  # close: all of the picture is fur
     look = FurLook(9, fill, LIT, thickness=1.4)
     expected = scene.frame(look, camera, SIZE)
     assert _psnr(scene.live_frame(look, camera, SIZE, BACKGROUND), expected) > 45
@@ -55,7 +58,7 @@ def test_shells_that_light_themselves_are_the_stages(scene: FurScene, fill: Fill
 
 
 def test_a_sky_lights_all_alike(scene: FurScene) -> None:
-    camera = scene.reference_views("columns", (12, 16))[0].camera
+    camera = scene.reference_views("plain", "columns", (12, 16))[0].camera
     look = FurLook(6, "columns", FurLight(sky=1.0, headlight=0.0))
     whole = decode_srgb(scene.live_frame(look, camera, SIZE) / 255.0)
     half = scene.live_frame(replace(look, light=FurLight(sky=0.5, headlight=0.0)), camera, SIZE)
@@ -69,29 +72,61 @@ def test_a_sky_lights_all_alike(scene: FurScene) -> None:
 
 
 def test_reference_views_show_each_setting_changed(scene: FurScene) -> None:
-    views = {view.name: view for view in scene.reference_views("columns", (24, 32))}
-    assert list(views) == ["front", "right", "back", "left", "close", "other_shells"]
+    views = {view.name: view for view in scene.reference_views("full", "columns", (24, 32))}
+    assert list(views) == [
+        *("front", "right", "back", "left", "close"),
+        *("full", "wind", "far", "plain", "other_shells"),
+    ]
     assert {view.look.layers for view in views.values()} == {6, 3}
     assert views["other_shells"].look.fill == "bands"
+    assert {name for name, view in views.items() if view.look.look == "plain"} == {
+        "plain",
+        "other_shells",
+    }
     assert views["close"].look.light.lamp > 0
+    assert views["wind"].look.wind.strength > 0
     assert all(view.frame.shape == (24, 32, 3) for view in views.values())
     assert len({view.frame.tobytes() for view in views.values()}) == len(views)
 
 
-def test_transparent_pixels_have_no_luminance(scene: FurScene) -> None:
+def test_far_away_fewer_shells_look_alike(scene: FurScene) -> None:
+    """What is drawn of six shells from there is nearly what all of them are; one shell is not."""
+    near = {view.name: view for view in scene.reference_views("full", "columns", (12, 16))}["full"]
+    camera = nearer(near.camera, 8.0)
+    rows = fur_pixels(camera, scene.mesh.vertices[-1], scene.fur.thickness, 2 * SIZE[0])
+    assert shells_seen(rows, 15) == 5
+    whole = scene.frame(near.look, camera, SIZE)
+    box = np.nonzero((whole != whole[0, 0]).any(axis=-1))
+    crop = tuple(slice(each.min() - 1, each.max() + 2) for each in box)
+    assert min(whole[crop].shape[:2]) >= 7
+    few = scene.frame(replace(near.look, layers=5), camera, SIZE)
+    one = scene.frame(replace(near.look, layers=1), camera, SIZE)
+    assert _psnr(few[crop], whole[crop]) > 30
+    assert _psnr(one[crop], whole[crop]) < 25
+
+
+def test_fur_pixels_are_those_of_a_ruler_at_the_nearest_point() -> None:
+    corners = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    camera = Camera((5.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 60.0, None)
+    seen = 2 * 4 * np.tan(np.pi / 6)
+    assert fur_pixels(camera, corners, 0.1, 300) == pytest.approx(0.1 * 300 / seen)
+    flat = replace(camera, height=2.5)
+    assert fur_pixels(flat, corners, 0.1, 300) == pytest.approx(12)
+    inside = replace(camera, position=(0.5, 0.0, 0.0))
+    assert np.isfinite(fur_pixels(inside, corners, 0.1, 300))
+
+
+def test_transparent_pixels_show_the_background(scene: FurScene) -> None:
     photograph = scene.photograph
     assert photograph.opaque is not None
-    luminance = luminance_part(photograph)
-    assert luminance.dtype == np.float32
-    assert np.array_equal(luminance < 0, ~photograph.opaque)
-    assert np.array_equal(luminance[photograph.opaque], photograph.luminance[photograph.opaque])
     shown = input_picture(photograph)
     expected = np.rint(255 * encode_srgb(np.array(BACKGROUND)))
     assert (shown[~photograph.opaque] == expected).all()
 
 
-def test_sources_stand_by_themselves() -> None:
-    vertex, fragment = shell_sources()
+@pytest.mark.parametrize("look", ["full", "plain"])
+def test_sources_stand_by_themselves(look: Look) -> None:
+    vertex, fragment = shell_sources(look)
     assert "#include" not in vertex + fragment
     assert "void placeVertex()" in vertex
     assert "vec3 surfaceColour()" in fragment
