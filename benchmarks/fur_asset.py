@@ -21,9 +21,15 @@ from benchmarks.fur_laying import laid_over_body
 from pipelines.drawing.picture_metrics import ssim_map
 from pipelines.drawing.stage import Light, Stage
 from pipelines.photo_fur.frames import BACKGROUND, ROUND_VIEWS, view_cameras
-from pipelines.photo_fur.laid_fur import LaidFur, laid_fur, laid_surface, shells_seen
+from pipelines.photo_fur.laid_fur import (
+    LaidFur,
+    laid_fur,
+    laid_surface,
+    rows_of_fur,
+    shells_seen,
+)
 from pipelines.photo_fur.laying import Body, lay
-from pipelines.photo_fur.live_parts import OUTDOORS, fur_pixels, nearer
+from pipelines.photo_fur.live_parts import OUTDOORS, nearer
 from pipelines.photo_fur.packed_fur import Laid, PackedFur, packed_fur
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.shells import ShellMesh
@@ -107,7 +113,9 @@ def _frames(photograph: FurPhotograph, fur: LaidFur) -> NDArray[np.floating]:
     found = []
     for camera in view_cameras(ROUND_VIEWS, fur.reach, _SIZE[1] / _SIZE[0]):
         with Stage(_SIZE[1], _SIZE[0], background=BACKGROUND, supersampling=_SAMPLES) as stage:
-            stage.add(laid_surface(fur, image, photograph.attenuation, OUTDOORS))
+            rows = rows_of_fur(camera, fur.skin, fur.thickness, _SAMPLES * _SIZE[0])
+            shells = shells_seen(rows)
+            stage.add(laid_surface(fur, image, photograph.attenuation, OUTDOORS, shells=shells))
             stage.light(Light())
             stage.look(camera)
             drawn = stage.radiance()
@@ -148,17 +156,17 @@ def _one_colour(photograph: FurPhotograph) -> FurPhotograph:
 
 
 def _detail(photograph: FurPhotograph, fur: LaidFur, mesh: ShellMesh) -> dict[str, Any]:
-    """From afar: frames with as many shells as are needed over frames with all, in turns on one
-    stage; SSIM of the two where the body is; and of frames whose shells differ by one, which is all
-    that is seen of a step. The ratio of the middle distance, SSIM of the worst; the null has a
+    """From afar: frames with as many shells as are needed over frames with one a layer, in turns on
+    one stage; SSIM of the two where the body is; and of frames whose shells differ by one, which is
+    all that is seen of a step. The ratio of the middle distance, SSIM of the worst; the null has a
     single shell."""
     image = fur_texture(photograph, fur.layers, tails="end layers")
     ratios, likeness, steps, nulls, shells = [], [], [], [], {}
     (near,) = view_cameras(ROUND_VIEWS[:1], fur.reach, _SIZE[1] / _SIZE[0])
     for times in _DISTANCES:
         camera = nearer(near, times)
-        rows = fur_pixels(camera, mesh.vertices[-1], fur.thickness, _SAMPLES * _SIZE[0])
-        seen = shells_seen(rows, fur.layers)
+        rows = rows_of_fur(camera, mesh.vertices[-1], fur.thickness, _SAMPLES * _SIZE[0])
+        seen = min(fur.layers, shells_seen(rows))
         shells[f"{times:g}"] = seen
         counts = {"all": fur.layers, "seen": seen, "one fewer": seen - 1, "one": 1}
         with Stage(_SIZE[1], _SIZE[0], background=BACKGROUND, supersampling=_SAMPLES) as stage:

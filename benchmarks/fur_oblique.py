@@ -22,7 +22,7 @@ from pipelines.drawing.stage import Camera, Light, Stage
 from pipelines.geometry.meshes import Mesh
 from pipelines.photo_fur.attenuation import CALIBRATED_ENDS
 from pipelines.photo_fur.frames import BACKGROUND
-from pipelines.photo_fur.laid_fur import Hair, LaidFur, laid_fur, laid_surface
+from pipelines.photo_fur.laid_fur import Hair, LaidFur, laid_fur, laid_surface, shells_seen
 from pipelines.photo_fur.photograph import FurPhotograph, fur_photograph
 from pipelines.photo_fur.photograph_lie import photograph_lie
 from pipelines.photo_fur.shells import shell_vertices
@@ -177,7 +177,11 @@ def _drawn_full(scene: Scene, photograph: FurPhotograph) -> Picture:
     fur = repeated_over(scene.body, scene.coat, photograph)
     image = fur_texture(photograph, LAYERS, tails="end layers")
     light = FurLight() if scene.lamp is None else FurLight(0.0, 0.0, 1.0, scene.lamp)
-    return _seen(scene, laid_surface(fur, image, photograph.attenuation, light, wrap="repeat"))
+    rows = fur.thickness * _SUPERSAMPLING * SIZE[0] / scene.view.height
+    actor = laid_surface(
+        fur, image, photograph.attenuation, light, shells=shells_seen(rows), wrap="repeat"
+    )
+    return _seen(scene, actor)
 
 
 def _drawn_plain(scene: Scene, photograph: FurPhotograph) -> Picture:

@@ -128,12 +128,14 @@ def texture(
     wrap: Wrap = "clamp",
     interpolate: bool = True,
     mipmap: bool = False,
+    anisotropic: bool = True,
     srgb: bool = False,
 ) -> Any:
     """An array (height, width, channels) as a VTK texture; row 0 is the top of the picture.
 
     One channel is grey, two are red and green. uint8 stays 8 bit a channel; ``srgb`` says that its
     colours are sRGB codes, decoded when they are sampled (alpha is not). float32 stays float32.
+    Mipmaps are anisotropic as drivers see fit: each has another picture.
     """
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
@@ -160,6 +162,8 @@ def texture(
     made.SetColorModeToDirectScalars()
     made.SetInterpolate(interpolate)
     made.SetMipmap(mipmap)
+    if not anisotropic:
+        made.SetMaximumAnisotropicFiltering(1.0)
     made.SetWrap(_WRAP_CODE[wrap])
     made.SetUseSRGBColorSpace(srgb)
     return made

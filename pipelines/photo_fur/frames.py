@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, Light, Stage, fitting_distance, orbit
 from pipelines.photo_fur.attenuation import Tails
-from pipelines.photo_fur.laid_fur import LaidFur, laid_surface
+from pipelines.photo_fur.laid_fur import LaidFur, laid_surface, rows_of_fur, shells_seen
 from pipelines.photo_fur.photograph import FurPhotograph
 from pipelines.photo_fur.shells import ShellMesh
 from pipelines.photo_fur.stage_view import Fill, FurLight, fur_surface, fur_texture
@@ -69,7 +69,7 @@ def draw_frames(
     """
     image = fur_texture(photograph, mesh.layers, tails=tails)
 
-    def fur(view: View) -> Any:
+    def fur(view: View, camera: Camera) -> Any:
         return fur_surface(
             mesh.vertices,
             mesh.normals,
@@ -101,24 +101,26 @@ def draw_laid_frames(
     """
     image = fur_texture(photograph, fur.layers, tails=tails)
 
-    def laid(view: View) -> Any:
+    def laid(view: View, camera: Camera) -> Any:
         lamp = orbit((0.0, 0.0, 0.0), 1.0, view.azimuth - _LAMP_BESIDE, _LAMP_ABOVE).position
         light = FurLight(sky=0.15, headlight=0.35, lamp=0.75, light=lamp)
-        return laid_surface(fur, image, photograph.attenuation, light)
+        rows = rows_of_fur(camera, fur.skin, fur.thickness, supersampling * size[0])
+        shells = shells_seen(rows)
+        return laid_surface(fur, image, photograph.attenuation, light, shells=shells)
 
     return _taken(laid, fur.reach, views, size, supersampling, progress)
 
 
 def _taken(
-    actor: Callable[[View], Any],
+    actor: Callable[[View, Camera], Any],
     points: NDArray[np.float32],
     views: Sequence[View],
     size: tuple[int, int],
     supersampling: int,
     progress: Callable[[float], None] | None,
 ) -> Frames:
-    """Pictures of what is drawn for each view, with all points (n, 3) in each; a lamp along the
-    view lights what does not light itself."""
+    """Pictures of what is drawn for each view and its camera, all with all points (n, 3); a lamp
+    along the view lights what does not light itself."""
     height, width = size
     pictures, coverage = [], []
     cameras = view_cameras(views, points, width / height)
@@ -127,7 +129,7 @@ def _taken(
             progress(done / len(views))
         scale = 1 if view.as_photographed else supersampling
         with Stage(width, height, background=BACKGROUND, supersampling=scale) as stage:
-            stage.add(actor(view))
+            stage.add(actor(view, camera))
             stage.light(Light())
             stage.look(camera)
             picture = stage.radiance()

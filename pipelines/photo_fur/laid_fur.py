@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
-from pipelines.drawing.stage import Wrap, surface, texture
+from pipelines.drawing.stage import Camera, Wrap, surface, texture
 from pipelines.photo_fur.attenuation import Attenuation, code_steps
 from pipelines.photo_fur.laying import Laying
 from pipelines.photo_fur.shells import mesh_radius
@@ -30,34 +30,34 @@ HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
-SPREAD = 1.9
+SPREAD = 2.2
 """How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
 true ones least are nearer to their mean, and of those an outline would be smooth."""
 BIAS = -0.5
 """Of the photograph's mipmaps: hairs are thin, and a blur of them has no outline."""
 GUSTS = 4.0
 """Radians of a gust over a mesh radius."""
-FEWEST_SHELLS, SHELLS_A_PIXEL = 5, 1.1
-"""With these SSIM of pictures with all shells and with few stays above 0.98 (`lod_ssim`)."""
+FEWEST_SHELLS, MOST_SHELLS, SHELLS_A_PIXEL = 5, 40, 1.1
+"""Fewer a pixel are seen to be fewer (`lod_ssim`)."""
 LAID_SHADERS = ("fur_laid_vertex.glsl", "fur_laid_fragment.glsl")
 """Of vertices and fragments of fur laid in patches."""
 
 
 SHADING = {
     "HOT_SPOT": 0.35,  # radians from the view within which a lamp lights all that is seen
-    "CONTRAST": 0.3,  # by how much more light from aside tells heights apart than light from above
+    "CONTRAST": 0.15,  # by how much more light from aside tells heights apart than light from above
     "SLANT": 0.34,  # the same, for each length of attenuation that slanting light has more of
     "MOST_SLANT": 1.7,
     "DIM": 0.35,  # of slanting light, how much of its mean shadows take
-    "MOST_DIM": 1.4,
-    "BELOW": 0.5,  # how fast a hair darkens below its tip, of the medium's attenuation
+    "MOST_DIM": 1.7,
+    "BELOW": 1.2,  # how fast a hair darkens below its tip, of the medium's attenuation
     "DUSK": 0.275,  # cosine from which on, before and behind the horizon, a lamp fades
-    "ASIDE": 0.88,  # of a lamp's light, what shadows of hair on hair leave
+    "ASIDE": 0.8,  # of a lamp's light, what shadows of hair on hair leave
     "FIBRE": 0.5,  # power of the fibre's light
     "TILT": 1.8,  # of hair, tangent of the angle from upright
     "STANDS": 0.225,  # how far down from its own depth a hair stands, thicknesses
     "EDGE": 0.3,  # what of that is left where the surface is seen from aside,
-    "EDGE_TO": 0.45,  # below this cosine
+    "EDGE_TO": 0.3,  # below this cosine
 }
 """How light falls on hair and how it stands, fitted to a traced pelt that no figure is of."""
 
@@ -144,8 +144,7 @@ def laid_surface(
     photograph; of one that is a tile, "repeat".
     """
     shells = shells or fur.layers
-    middle, highest = middle_depth(image, fur.layers), highest_depth(image, fur.layers)
-    drawn = np.arange(int(highest * shells) + 1, shells + 1)
+    drawn = np.arange(1, shells + 1)
     count, laying = len(fur.skin), fur.laying
     uvs = texture_coordinates(laying.uvs, image.shape[:2])
 
@@ -165,12 +164,12 @@ def laid_surface(
             "uvThird": each(uvs[:, 2]),
             "weights": each(laying.weights),
         },
-        textures={"photograph": texture(image, wrap=wrap, mipmap=True, srgb=True)},
+        textures={"photograph": _photograph(image, wrap)},
         shader=surface_shader(
             *LAID_SHADERS,
             CODES=float(code_steps(fur.layers) * fur.layers),
             DECAY=attenuation.coefficient,
-            MIDDLE=middle,
+            MIDDLE=middle_depth(image, fur.layers),
             LAYERS=float(shells),
             THICKNESS=float(fur.thickness),
             WIND=float(wind.strength),
@@ -184,6 +183,10 @@ def laid_surface(
         ),
         lit=False,
     )
+
+
+def _photograph(image: NDArray[np.uint8], wrap: Wrap) -> Any:
+    return texture(image, wrap=wrap, mipmap=True, anisotropic=False, srgb=True)
 
 
 def constants() -> dict[str, Any]:
@@ -200,7 +203,11 @@ def constants() -> dict[str, Any]:
 
 def packed_constants() -> dict[str, float]:
     """All numbers of the full look that readers of packages need, by name."""
-    shells = {"FEWEST_SHELLS": FEWEST_SHELLS, "SHELLS_A_PIXEL": SHELLS_A_PIXEL}
+    shells = {
+        "FEWEST_SHELLS": FEWEST_SHELLS,
+        "MOST_SHELLS": MOST_SHELLS,
+        "SHELLS_A_PIXEL": SHELLS_A_PIXEL,
+    }
     return constants() | shells | {"GUSTS": GUSTS}
 
 
@@ -216,20 +223,27 @@ def middle_depth(image: NDArray[np.uint8], layers: int) -> float:
     return float(hair.mean() / most) if len(hair) else 0.5
 
 
-def highest_depth(image: NDArray[np.uint8], layers: int) -> float:
-    """Depth of the highest hair as it is drawn, thicknesses."""
-    middle, most = middle_depth(image, layers), code_steps(layers) * layers
-    highest = middle + SPREAD * (float(image[..., 3].min()) / most - middle)
-    return float(np.clip(highest, 0.0, 1.0 - 1e-6))
+def shells_seen(rows: float) -> int:
+    """How many shells fur needs that is so many rows of samples thick.
 
-
-def shells_seen(fur_pixels: float, layers: int) -> int:
-    """How many shells fur needs that is so many rows of samples thick, at most `layers`.
-
-    >>> shells_seen(100.0, 15), shells_seen(2.0, 15)
-    (15, 5)
+    >>> shells_seen(100.0), shells_seen(10.0), shells_seen(2.0)
+    (40, 11, 5)
     """
-    return min(layers, max(FEWEST_SHELLS, math.ceil(SHELLS_A_PIXEL * fur_pixels)))
+    return min(MOST_SHELLS, max(FEWEST_SHELLS, math.ceil(SHELLS_A_PIXEL * rows)))
+
+
+def rows_of_fur(
+    camera: Camera, vertices: NDArray[np.floating], thickness: float, height: int
+) -> float:
+    """Rows of samples, of a picture with ``height`` of them, that fur so thick takes where a sphere
+    about all vertices (V, 3) is nearest, though not nearer than a tenth of its radius."""
+    if camera.height is not None:
+        return thickness * height / camera.height
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    radius = mesh_radius(vertices)
+    away = float(np.linalg.norm(np.asarray(camera.position) - middle))
+    nearest = max(away - radius, 0.1 * radius)
+    return thickness * height / (2 * math.tan(math.radians(camera.view_angle) / 2) * nearest)
 
 
 def texture_coordinates(

@@ -6,7 +6,6 @@ changed while they draw. Of the plain look the stage has them lifted before; bot
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -25,10 +24,11 @@ from pipelines.photo_fur.laid_fur import (
     LaidFur,
     Wind,
     laid_surface,
+    rows_of_fur,
     shells_seen,
 )
 from pipelines.photo_fur.photograph import FurPhotograph
-from pipelines.photo_fur.shells import ShellMesh, mesh_radius, shell_vertices
+from pipelines.photo_fur.shells import ShellMesh, shell_vertices
 from pipelines.photo_fur.stage_view import (
     LIVE_SHADERS,
     Fill,
@@ -62,6 +62,7 @@ class FurLook:
     """What can be set of a fur."""
 
     layers: int
+    """Of the plain look, as is the fill; of the full one there are as many shells as are seen."""
     fill: Fill
     light: FurLight
     thickness: float = 1.0
@@ -131,16 +132,16 @@ class FurScene:
         )
 
     def _laid(self, look: FurLook, camera: Camera, height: int) -> Any:
-        """The actor, with no more shells than a picture of so many rows of samples shows."""
+        """The actor, with as many shells as a picture of so many rows of samples shows."""
         fur = self.fur._replace(thickness=look.thickness * self.fur.thickness)
-        seen = fur_pixels(camera, self.mesh.vertices[-1], fur.thickness, height)
+        rows = rows_of_fur(camera, self.mesh.vertices[-1], fur.thickness, height)
         return laid_surface(
             fur,
             fur_texture(self.photograph, fur.layers, tails=self.tails),
             self.photograph.attenuation,
             look.light,
             wind=look.wind,
-            shells=shells_seen(seen, look.layers),
+            shells=shells_seen(rows),
         )
 
     def cameras(self, views: Sequence[View], aspect: float) -> list[Camera]:
@@ -215,20 +216,6 @@ class FurScene:
         """What a live view shows at first, size = (height, width) pixels."""
         (camera,) = self.cameras([_POSTER_VIEW], size[1] / size[0])
         return self.live_frame(FurLook(self.mesh.layers, fill, OUTDOORS, look=look), camera, size)
-
-
-def fur_pixels(
-    camera: Camera, vertices: NDArray[np.floating], thickness: float, height: int
-) -> float:
-    """Rows of samples, of a picture with ``height`` of them, that fur so thick takes where a sphere
-    about all vertices (V, 3) is nearest, though not nearer than a tenth of its radius."""
-    if camera.height is not None:
-        return thickness * height / camera.height
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    radius = mesh_radius(vertices)
-    away = float(np.linalg.norm(np.asarray(camera.position) - middle))
-    nearest = max(away - radius, 0.1 * radius)
-    return thickness * height / (2 * math.tan(math.radians(camera.view_angle) / 2) * nearest)
 
 
 def input_picture(photograph: FurPhotograph) -> NDArray[np.uint8]:

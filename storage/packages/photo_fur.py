@@ -53,9 +53,9 @@ casts no shadows: a fragment shows its colour times (sky + headlight max(n·v, 0
 **State** of a view: `look`, `layers`, `thickness` (in `thickness`es), `fill`, radiances of an even
 `sky`, of a lamp along the view, `headlight`, and of one towards `light`, `lamp`; `wind`, and the
 seconds `moment` since it began. Where no fur is pictures show `background`. In the full look
-min(`layers`, max(FEWEST_SHELLS, ceil(SHELLS_A_PIXEL x))) shells are drawn, x the fur's thickness in
-samples where a sphere about the middle of the mesh's box that holds its vertices is nearest, though
-not nearer than a tenth of its radius.
+min(MOST_SHELLS, max(FEWEST_SHELLS, ceil(SHELLS_A_PIXEL x))) shells are drawn, x the fur's thickness
+in samples where a sphere about the middle of the mesh's box that holds its vertices is nearest,
+though not nearer than a tenth of its radius.
 """
 
 _PATCH = ("patch",)

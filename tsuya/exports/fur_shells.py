@@ -127,7 +127,6 @@ def write_three(package: Package, target: Path) -> Notes:
     """
     from PIL import Image
 
-    from pipelines.photo_fur.laid_fur import highest_depth
     from pipelines.photo_fur.live_parts import shell_sources
     from pipelines.photo_fur.shells import mesh_radius
 
@@ -136,7 +135,6 @@ def write_three(package: Package, target: Path) -> Notes:
     is_full = package.parameter("look") == "full"
     vertex, fragment = shell_sources(package.parameter("look"))
     told = {name: package.parameter(name) for name in _TOLD}
-    told["highest"] = highest_depth(picture, mesh.layers)
     told["radius"] = mesh_radius(mesh.vertices[-1])
     target.mkdir(parents=True)
     (target / "fur.js").write_bytes(files("tsuya.exports").joinpath("three/fur.js").read_bytes())

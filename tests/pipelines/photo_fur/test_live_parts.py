@@ -9,14 +9,14 @@ import pytest
 
 from pipelines.drawing.colour import decode_srgb, encode_srgb
 from pipelines.drawing.stage import Camera
+from pipelines.photo_fur import live_parts
 from pipelines.photo_fur.frames import BACKGROUND
-from pipelines.photo_fur.laid_fur import shells_seen
+from pipelines.photo_fur.laid_fur import FEWEST_SHELLS, rows_of_fur, shells_seen
 from pipelines.photo_fur.live_parts import (
     LAMP,
     NIGHT,
     FurLook,
     FurScene,
-    fur_pixels,
     input_picture,
     nearer,
     shell_sources,
@@ -89,31 +89,33 @@ def test_reference_views_show_each_setting_changed(scene: FurScene) -> None:
     assert len({view.frame.tobytes() for view in views.values()}) == len(views)
 
 
-def test_far_away_fewer_shells_look_alike(scene: FurScene) -> None:
-    """What is drawn of six shells from there is nearly what all of them are; one shell is not."""
+def test_far_away_fewer_shells_look_alike(scene: FurScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is drawn from there is nearly what all shells are; one shell is not."""
     near = {view.name: view for view in scene.reference_views("full", "columns", (12, 16))}["full"]
     camera = nearer(near.camera, 8.0)
-    rows = fur_pixels(camera, scene.mesh.vertices[-1], scene.fur.thickness, 2 * SIZE[0])
-    assert shells_seen(rows, 15) == 5
-    whole = scene.frame(near.look, camera, SIZE)
-    box = np.nonzero((whole != whole[0, 0]).any(axis=-1))
+    seen = shells_seen(rows_of_fur(camera, scene.fur.skin, scene.fur.thickness, 2 * SIZE[0]))
+    assert seen == FEWEST_SHELLS
+    few = scene.frame(near.look, camera, SIZE)
+    box = np.nonzero((few != few[0, 0]).any(axis=-1))
     crop = tuple(slice(each.min() - 1, each.max() + 2) for each in box)
-    assert min(whole[crop].shape[:2]) >= 7
-    few = scene.frame(replace(near.look, layers=5), camera, SIZE)
-    one = scene.frame(replace(near.look, layers=1), camera, SIZE)
-    assert _psnr(few[crop], whole[crop]) > 30
-    assert _psnr(one[crop], whole[crop]) < 25
+    assert min(few[crop].shape[:2]) >= 7
+    others = []
+    for shells in (40, 1):
+        monkeypatch.setattr(live_parts, "shells_seen", lambda _, shells=shells: shells)
+        others.append(scene.frame(near.look, camera, SIZE)[crop])
+    assert _psnr(few[crop], others[0]) > 30
+    assert _psnr(few[crop], others[1]) < 25
 
 
-def test_fur_pixels_are_those_of_a_ruler_at_the_nearest_point() -> None:
+def test_rows_of_fur_are_those_of_a_ruler_at_the_nearest_point() -> None:
     corners = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
     camera = Camera((5.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 60.0, None)
     seen = 2 * 4 * np.tan(np.pi / 6)
-    assert fur_pixels(camera, corners, 0.1, 300) == pytest.approx(0.1 * 300 / seen)
+    assert rows_of_fur(camera, corners, 0.1, 300) == pytest.approx(0.1 * 300 / seen)
     flat = replace(camera, height=2.5)
-    assert fur_pixels(flat, corners, 0.1, 300) == pytest.approx(12)
+    assert rows_of_fur(flat, corners, 0.1, 300) == pytest.approx(12)
     inside = replace(camera, position=(0.5, 0.0, 0.0))
-    assert np.isfinite(fur_pixels(inside, corners, 0.1, 300))
+    assert np.isfinite(rows_of_fur(inside, corners, 0.1, 300))
 
 
 def test_transparent_pixels_show_the_background(scene: FurScene) -> None:

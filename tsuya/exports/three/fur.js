@@ -45,7 +45,7 @@ const ATTRIBUTES = {
   _uvthird: "uvThird",
   _weights: "weights",
 };
-const MOST_SHELLS = 250;
+const MOST_LAYERS = 250;
 // In radii: fur is seen from no nearer when shells are counted.
 const NEAREST = 0.1;
 const VERTEX_MAIN = `void main() {
@@ -70,17 +70,18 @@ export async function loadFur(folder) {
     fetched(folder, "fur.json").then((answer) => answer.json()),
     fetched(folder, "vertex.glsl").then((answer) => answer.text()),
     fetched(folder, "fragment.glsl").then((answer) => answer.text()),
-    fetched(folder, "photograph.png").then((answer) => photographTexture(answer)),
+    fetched(folder, "photograph.png").then((answer) => answer.blob()),
     new GLTFLoader().loadAsync(new URL("surface.glb", folder).href),
   ]);
+  const image = await photographTexture(photograph, about.look === "full");
   let surface;
   gltf.scene.updateMatrixWorld();
   gltf.scene.traverse((each) => (surface = each.isMesh ? each : surface));
   const geometry = onceALayer(surface.geometry);
-  const fur = new THREE.Mesh(geometry, material(about, vertex, fragment, photograph));
+  const fur = new THREE.Mesh(geometry, material(about, vertex, fragment, image));
   fur.applyMatrix4(surface.matrixWorld);
   fur.frustumCulled = false;
-  fur.userData = { about, detail: 1 };
+  fur.userData = { about };
   geometry.computeBoundingBox();
   fur.onBeforeRender = (renderer, scene, camera) => {
     const target = renderer.getRenderTarget();
@@ -89,7 +90,6 @@ export async function loadFur(folder) {
     drawShells(fur, about.look === "full" ? shellsSeen(fur, camera, height) : about.layers);
     fur.material.uniformsNeedUpdate = true;
   };
-  drawShells(fur, about.layers);
   return fur;
 }
 
@@ -108,7 +108,7 @@ export function setFur(fur, { thickness, sky, headlight, lamp, light, wind, mome
 /** Shells that a picture of so many rows needs: fewer where the fur is few pixels thick. */
 function shellsSeen(fur, camera, height) {
   const { about } = fur.userData;
-  const { FEWEST_SHELLS, SHELLS_A_PIXEL } = about.constants;
+  const { FEWEST_SHELLS, MOST_SHELLS, SHELLS_A_PIXEL } = about.constants;
   const scale = fur.matrixWorld.getMaxScaleOnAxis();
   const middle = fur.geometry.boundingBox.getCenter(new THREE.Vector3()).applyMatrix4(fur.matrixWorld);
   const away = middle.distanceTo(new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld));
@@ -116,19 +116,11 @@ function shellsSeen(fur, camera, height) {
   const nearest = camera.isPerspectiveCamera ? Math.max(away - radius, NEAREST * radius) : 1;
   // The projection's second number is 2 over the picture's height a unit away.
   const pixels = (scale * fur.material.uniforms.thickness.value * height * camera.projectionMatrix.elements[5]) / (2 * nearest);
-  return Math.min(about.layers, Math.max(FEWEST_SHELLS, Math.ceil(SHELLS_A_PIXEL * pixels)));
+  return Math.min(MOST_SHELLS, Math.max(FEWEST_SHELLS, Math.ceil(SHELLS_A_PIXEL * pixels)));
 }
 
-/** So many shells, without those above the highest hair. */
 function drawShells(fur, shells) {
-  const { about, drawn } = fur.userData;
-  if (drawn === shells) return;
-  fur.userData.drawn = shells;
-  const first = about.look === "full" ? Math.floor(about.highest * shells) + 1 : 1;
-  const layer = fur.geometry.getAttribute("layer");
-  for (let n = 0; n < MOST_SHELLS; n++) layer.setX(n, first + n);
-  layer.needsUpdate = true;
-  fur.geometry.instanceCount = shells - first + 1;
+  fur.geometry.instanceCount = shells;
   fur.material.uniforms.layers.value = shells;
 }
 
@@ -139,12 +131,13 @@ async function fetched(folder, name) {
 }
 
 /** Alpha is a depth, no opacity: colours must not be multiplied by it. */
-async function photographTexture(answer) {
+async function photographTexture(file, mipmap) {
   const options = { premultiplyAlpha: "none", colorSpaceConversion: "none", imageOrientation: "flipY" };
-  const texture = new THREE.Texture(await createImageBitmap(await answer.blob(), options));
+  const texture = new THREE.Texture(await createImageBitmap(file, options));
   texture.wrapS = texture.wrapT = THREE.MirroredRepeatWrapping;
-  texture.minFilter = texture.magFilter = THREE.LinearFilter;
-  texture.generateMipmaps = false;
+  texture.magFilter = THREE.LinearFilter;
+  texture.minFilter = mipmap ? THREE.LinearMipmapLinearFilter : THREE.LinearFilter;
+  texture.generateMipmaps = mipmap;
   texture.colorSpace = THREE.SRGBColorSpace;
   texture.needsUpdate = true;
   return texture;
@@ -160,7 +153,8 @@ function onceALayer(surface) {
   }
   const uv = made.getAttribute("uv");
   for (let n = 0; n < (uv?.count ?? 0); n++) uv.setY(n, 1 - uv.getY(n)); // glTF counts v from the top
-  made.setAttribute("layer", new THREE.InstancedBufferAttribute(new Float32Array(MOST_SHELLS), 1));
+  const numbers = Float32Array.from({ length: MOST_LAYERS }, (_, n) => n + 1);
+  made.setAttribute("layer", new THREE.InstancedBufferAttribute(numbers, 1));
   return made;
 }
 

@@ -56,7 +56,7 @@ class Fur implements LiveView {
     this.medium = { brightest: pkg.parameter("brightest"), darkest: pkg.parameter("darkest") };
     this.thickness = pkg.parameter("thickness");
     this.layers = pkg.parameter("layers");
-    this.depths = { codes: 1, attenuation: pkg.parameter("attenuation"), middle: pkg.parameter("middle"), highest: 0 };
+    this.depths = { codes: 1, attenuation: pkg.parameter("attenuation"), middle: pkg.parameter("middle") };
     this.look = {
       look: pkg.parameter<Look["look"]>("look"),
       layers: this.layers,
@@ -70,7 +70,7 @@ class Fur implements LiveView {
       light: [-0.48, -0.6, 0.64],
       background: "night",
     };
-    this.code(this.layers);
+    this.code(this.layers, this.look.look === "full");
     this.home = orbit(this.bounds.centre, this.bounds.radius / HOME.sine, HOME.azimuth, HOME.elevation);
   }
 
@@ -102,10 +102,11 @@ class Fur implements LiveView {
     const thickness = this.thickness * look.thickness;
     parts.full.visible = isFull;
     parts.plain.visible = !isFull;
-    // In the plain look each layer is a step of the codes; in the full one shells are any number.
-    this.code(isFull ? this.layers : look.layers);
+    // In the plain look each layer is a step of the codes; in the full one shells are any number,
+    // and the photograph has mipmaps.
+    this.code(isFull ? this.layers : look.layers, isFull);
     if (isFull) {
-      const shells = parts.full.shellsSeen(furPixels(camera, parts.sphere, thickness, height), look.layers);
+      const shells = parts.full.shellsSeen(rowsOfFur(camera, parts.sphere, thickness, height));
       const moment = look.moment ?? performance.now() / 1000;
       parts.full.setLook(look, shells, thickness, parts.sphere.radius, moment, this.depths);
     } else parts.plain.setLook(look, this.coded, thickness, this.depths.attenuation);
@@ -128,19 +129,18 @@ class Fur implements LiveView {
     this.parts.full.dispose();
   }
 
-  private code(layers: number): void {
-    if (layers === this.coded) return;
+  private code(layers: number, mipmap: boolean): void {
+    if (layers === this.coded && mipmap === this.parts.photograph.generateMipmaps) return;
     const dropped = this.pkg.parameter<string>("tails") === "dropped";
     const codes = depthCodes(this.parts.luminance, this.medium, layers, dropped);
-    setCodes(this.parts.photograph, codes);
+    setCodes(this.parts.photograph, codes, mipmap);
     this.coded = layers;
     this.depths.codes = codeSteps(layers) * layers;
-    this.depths.highest = codes.reduce((least, code) => Math.min(least, code), 255) / this.depths.codes;
   }
 }
 
-/** Pixels of a picture that fur so thick takes where the sphere about the mesh is nearest. */
-function furPixels({ position, view_angle, height: high }: Camera, sphere: Bounds, thickness: number, height: number): number {
+/** Rows of samples that fur so thick takes where the sphere about the mesh is nearest. */
+function rowsOfFur({ position, view_angle, height: high }: Camera, sphere: Bounds, thickness: number, height: number): number {
   if (high !== null) return (thickness * height) / high;
   const away = Math.hypot(...position.map((axis, i) => axis - sphere.centre[i]));
   const nearest = Math.max(away - sphere.radius, NEAREST * sphere.radius);

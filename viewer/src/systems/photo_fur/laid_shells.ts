@@ -28,8 +28,8 @@ const NAMES = {
 /** Of these numbers the page itself makes use; the others are the shader's. */
 export type Constants = Record<string, number> & {
   GUSTS: number;
-  SPREAD: number;
   FEWEST_SHELLS: number;
+  MOST_SHELLS: number;
   SHELLS_A_PIXEL: number;
 };
 
@@ -41,14 +41,10 @@ export interface Depths {
   attenuation: number;
   /** Mean depth of the hair, thicknesses. */
   middle: number;
-  /** Depth of the highest hair, thicknesses. */
-  highest: number;
 }
 
 /** The fur of a body: put it into a `THREE.Scene`. */
 export class LaidShells extends Surface {
-  private drawn = "";
-
   constructor(
     mesh: Required<MeshData>,
     body: Body,
@@ -87,16 +83,15 @@ export class LaidShells extends Surface {
     return (index!.count / 3) * instanceCount;
   }
 
-  /** Shells that fur needs whose thickness is so many pixels. */
-  shellsSeen(pixels: number, layers: number): number {
-    const { FEWEST_SHELLS, SHELLS_A_PIXEL } = this.constants;
-    return Math.min(layers, Math.max(FEWEST_SHELLS, Math.ceil(SHELLS_A_PIXEL * pixels)));
+  /** Shells that fur needs whose thickness is so many rows of samples. */
+  shellsSeen(rows: number): number {
+    const { FEWEST_SHELLS, MOST_SHELLS, SHELLS_A_PIXEL } = this.constants;
+    return Math.min(MOST_SHELLS, MOST_LAYERS, Math.max(FEWEST_SHELLS, Math.ceil(SHELLS_A_PIXEL * rows)));
   }
 
   /** Sets a look of so many shells; radius: the mesh's; thickness: in scene units. */
   setLook(look: Look, shells: number, thickness: number, radius: number, moment: number, depths: Depths): void {
     const { uniforms } = this;
-    const { GUSTS, SPREAD } = this.constants;
     uniforms.codeCount.value = depths.codes;
     uniforms.decay.value = depths.attenuation;
     uniforms.middle.value = depths.middle;
@@ -104,25 +99,12 @@ export class LaidShells extends Surface {
     uniforms.layers.value = shells;
     uniforms.wind.value = look.wind;
     uniforms.moment.value = moment;
-    uniforms.gust.value = GUSTS / radius;
+    uniforms.gust.value = this.constants.GUSTS / radius;
     uniforms.skyRadiance.value = look.sky;
     uniforms.headlight.value = look.headlight;
     uniforms.lampRadiance.value = look.lamp;
     uniforms.lampTowards.value.set(...look.light);
-    const highest = Math.min(Math.max(depths.middle + SPREAD * (depths.highest - depths.middle), 0), 1 - 1e-6);
-    this.number(Math.floor(highest * shells) + 1, shells);
-  }
-
-  /** Draws the shells of these numbers: none above the highest hair. */
-  private number(from: number, to: number): void {
-    const drawn = `${from} ${to}`;
-    if (drawn === this.drawn) return;
-    this.drawn = drawn;
-    const geometry = this.geometry as THREE.InstancedBufferGeometry;
-    const layer = geometry.getAttribute("layer") as THREE.InstancedBufferAttribute;
-    for (let n = 0; n < MOST_LAYERS; n++) layer.setX(n, from + n);
-    layer.needsUpdate = true;
-    geometry.instanceCount = to - from + 1;
+    (this.geometry as THREE.InstancedBufferGeometry).instanceCount = shells;
   }
 }
 

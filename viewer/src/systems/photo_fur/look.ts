@@ -7,6 +7,7 @@ import { MOST_LAYERS } from "./codes";
 export interface Look {
   /** Patches along the lie and light on hairs, or the paper's shells. */
   look: "full" | "plain";
+  /** Of the plain look; of the full one as many shells are drawn as are seen. */
   layers: number;
   /** In the package's thicknesses. */
   thickness: number;
@@ -48,12 +49,12 @@ export function controlsOf(look: Look, backgrounds: readonly string[]): Control[
   const options = (names: readonly string[]) =>
     names.map((value) => ({ value, label: value[0].toUpperCase() + value.slice(1) }));
   const layers = { ...slider("layers", "Layers", 1), max: Math.max(RANGES.layers[1], look.layers) } as Control;
+  const fill: Control = { kind: "choice", name: "fill", label: "Fill", options: options(FILLS) };
   const isFull = look.look === "full";
   return [
     { kind: "choice", name: "look", label: "Look", options: options(LOOKS) },
     slider("thickness", "Thickness", 0.05, "×"),
-    layers,
-    isFull ? slider("wind", "Wind", 0.05, "×") : { kind: "choice", name: "fill", label: "Fill", options: options(FILLS) },
+    ...(isFull ? [slider("wind", "Wind", 0.05, "×")] : [layers, fill]),
     { kind: "direction", name: "light", label: "Lamp" },
     slider("lamp", "Lamp's light", 0.05),
     slider("headlight", "Light along the view", 0.05),

@@ -1,6 +1,6 @@
 /** The photograph of a package: its colours, the luminance that its depths come from, its texture. */
 
-import type * as THREE from "three";
+import * as THREE from "three";
 import { texture } from "../../drawing/textures";
 import { BadPackage } from "../../package/bad_package";
 import type { Package, Picture } from "../../package/package";
@@ -57,12 +57,14 @@ export function photographTexture(photograph: Picture<Uint8Array>): THREE.DataTe
   return texture(photograph, { wrap: "mirrored", srgb: true });
 }
 
-/** Other depth codes, row 0 at the top, into the texture's alpha. */
-export function setCodes(photograph: THREE.DataTexture, codes: Uint8Array): void {
+/** Other depth codes, row 0 at the top, into the texture's alpha; with mipmaps, or without. */
+export function setCodes(photograph: THREE.DataTexture, codes: Uint8Array, mipmap: boolean): void {
   const { width, height, data } = photograph.image as { width: number; height: number; data: Uint8Array };
   for (let row = 0; row < height; row++) {
     const from = (height - 1 - row) * width;
     for (let column = 0; column < width; column++) data[4 * (row * width + column) + 3] = codes[from + column];
   }
+  photograph.minFilter = mipmap ? THREE.LinearMipmapLinearFilter : THREE.LinearFilter;
+  photograph.generateMipmaps = mipmap;
   photograph.needsUpdate = true;
 }
