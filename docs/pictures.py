@@ -23,6 +23,7 @@ from assets_defs.street_billboards.textures import TextureSettings, view_texture
 from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from benchmarks.fur_oblique import oblique_pictures
+from docs.fur_pictures import close_and_against_the_light, fur_scene, in_wind
 from pipelines.drawing.colour import to_8bit
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
@@ -74,6 +75,9 @@ def _fur(store: VersionedStore) -> None:
     _row("fur-animal.jpg", *frames["pelt"])
     _row("fur-decay.png", _shown(store, FUR, "attenuation", {"photo": "pelt"}))
     _row("fur-report.jpg", _shown(store, FUR, "fur_photo", {"photo": "cat"}))
+    pelt = fur_scene(store, "pelt", "animal")
+    _row("fur-close.jpg", *close_and_against_the_light(pelt))
+    _moving("fur-wind.webp", in_wind(pelt), milliseconds=190)
     columns = [np.vstack(pictures) for pictures in oblique_pictures(7, 16)]
     Image.fromarray(np.hstack(columns)).save(FOLDER / "fur-oblique.jpg", quality=88)
 
@@ -208,9 +212,16 @@ def _shown(
     return made[name]
 
 
-def _moving(name: str, frames: NDArray[np.uint8]) -> None:
+def _moving(name: str, frames: NDArray[np.uint8], milliseconds: int = 400) -> None:
     first, *others = (Image.fromarray(frame) for frame in frames)
-    first.save(FOLDER / name, save_all=True, append_images=others, duration=400, loop=0, quality=75)
+    first.save(
+        FOLDER / name,
+        save_all=True,
+        append_images=others,
+        duration=milliseconds,
+        loop=0,
+        quality=75,
+    )
 
 
 def _column(name: str, *pictures: NDArray[np.uint8]) -> None:

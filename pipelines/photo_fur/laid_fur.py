@@ -30,10 +30,10 @@ HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
-SPREAD = 2.2
+SPREAD = 2.6
 """How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
 true ones least are nearer to their mean, and of those an outline would be smooth."""
-BIAS = -0.5
+BIAS = -1.0
 """Of the photograph's mipmaps: hairs are thin, and a blur of them has no outline."""
 GUSTS = 4.0
 """Radians of a gust over a mesh radius."""
@@ -52,11 +52,11 @@ SHADING = {
     "MOST_DIM": 1.7,
     "BELOW": 1.2,  # how fast a hair darkens below its tip, of the medium's attenuation
     "DUSK": 0.275,  # cosine from which on, before and behind the horizon, a lamp fades
-    "ASIDE": 0.8,  # of a lamp's light, what shadows of hair on hair leave
+    "ASIDE": 0.77,  # of a lamp's light, what shadows of hair on hair leave
     "FIBRE": 0.5,  # power of the fibre's light
     "TILT": 1.8,  # of hair, tangent of the angle from upright
     "STANDS": 0.225,  # how far down from its own depth a hair stands, thicknesses
-    "EDGE": 0.3,  # what of that is left where the surface is seen from aside,
+    "EDGE": 0.25,  # what of that is left where the surface is seen from aside,
     "EDGE_TO": 0.3,  # below this cosine
 }
 """How light falls on hair and how it stands, fitted to a traced pelt that no figure is of."""
