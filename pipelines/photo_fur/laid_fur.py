@@ -33,7 +33,7 @@ GLOSS = 0.03
 SPREAD = 2.6
 """How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
 true ones least are nearer to their mean, and of those an outline would be smooth."""
-BIAS = -1.0
+BIAS = -0.5
 """Of the photograph's mipmaps: hairs are thin, and a blur of them has no outline."""
 GUSTS = 4.0
 """Radians of a gust over a mesh radius."""
