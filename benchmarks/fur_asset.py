@@ -158,7 +158,7 @@ def _one_colour(photograph: FurPhotograph) -> FurPhotograph:
 def _detail(photograph: FurPhotograph, fur: LaidFur, mesh: ShellMesh) -> dict[str, Any]:
     """From afar: frames with as many shells as are needed over frames with one a layer, in turns on
     one stage; SSIM of the two where the body is; and of frames whose shells differ by one, which is
-    all that is seen of a step. The ratio of the middle distance, SSIM of the worst; the null has a
+    all that is seen of a step. The ratio of the farthest, SSIM of the worst; the null has a
     single shell."""
     image = fur_texture(photograph, fur.layers, tails="end layers")
     ratios, likeness, steps, nulls, shells = [], [], [], [], {}
@@ -185,7 +185,7 @@ def _detail(photograph: FurPhotograph, fur: LaidFur, mesh: ShellMesh) -> dict[st
         steps.append(float(ssim_map(crops["one fewer"], crops["seen"]).mean()))
         nulls.append(float(ssim_map(crops["one"], crops["all"]).mean()))
     return {
-        "lod_frame_ratio": ratios[1],
+        "lod_frame_ratio": ratios[-1],
         "lod_frame_ratio_each": ratios,
         "lod_ssim": min(likeness),
         "lod_ssim_each": likeness,

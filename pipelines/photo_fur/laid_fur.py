@@ -30,14 +30,12 @@ HEIGHT_OF_WEIGHT = 0.6
 """By how much a patch's hairs are taller in its middle than at its rim, in thicknesses."""
 GLOSS = 0.03
 """Radiance of a highlight under a lamp of radiance 1."""
-SPREAD = 2.6
+SPREAD = 2.1
 """How much further from their mean heights are drawn than Eq. 1 has them: the depths that miss the
 true ones least are nearer to their mean, and of those an outline would be smooth."""
-BIAS = -0.5
-"""Of the photograph's mipmaps: hairs are thin, and a blur of them has no outline."""
 GUSTS = 4.0
 """Radians of a gust over a mesh radius."""
-FEWEST_SHELLS, MOST_SHELLS, SHELLS_A_PIXEL = 5, 40, 1.1
+FEWEST_SHELLS, MOST_SHELLS, SHELLS_A_PIXEL = 5, 40, 1.25
 """Fewer a pixel are seen to be fewer (`lod_ssim`)."""
 LAID_SHADERS = ("fur_laid_vertex.glsl", "fur_laid_fragment.glsl")
 """Of vertices and fragments of fur laid in patches."""
@@ -56,7 +54,7 @@ SHADING = {
     "FIBRE": 0.5,  # power of the fibre's light
     "TILT": 1.8,  # of hair, tangent of the angle from upright
     "STANDS": 0.225,  # how far down from its own depth a hair stands, thicknesses
-    "EDGE": 0.25,  # what of that is left where the surface is seen from aside,
+    "EDGE": 0.3,  # what of that is left where the surface is seen from aside,
     "EDGE_TO": 0.3,  # below this cosine
 }
 """How light falls on hair and how it stands, fitted to a traced pelt that no figure is of."""
@@ -195,7 +193,6 @@ def constants() -> dict[str, Any]:
         "BEND": BEND,
         "HEIGHT_OF_WEIGHT": HEIGHT_OF_WEIGHT,
         "GLOSS": GLOSS,
-        "BIAS": BIAS,
         "SPREAD": SPREAD,
         **SHADING,
     }
@@ -227,7 +224,7 @@ def shells_seen(rows: float) -> int:
     """How many shells fur needs that is so many rows of samples thick.
 
     >>> shells_seen(100.0), shells_seen(10.0), shells_seen(2.0)
-    (40, 11, 5)
+    (40, 13, 5)
     """
     return min(MOST_SHELLS, max(FEWEST_SHELLS, math.ceil(SHELLS_A_PIXEL * rows)))
 

@@ -15,7 +15,7 @@ flat in vec3 lampOut;
 // Of what is shown so far and of another patch the higher hair; height is that of the one shown.
 // A patch's weight counts as so many thicknesses.
 vec4 higherHair(vec4 shown, vec2 at, float weight, inout float height) {
-  vec4 texel = texture(photograph, at, BIAS);
+  vec4 texel = texture(photograph, at);
   if (weight < 0.02) return shown;
   float here = weight * HEIGHT_OF_WEIGHT - texel.a;
   if (here <= height) return shown;
