@@ -67,8 +67,9 @@ vec3 surfaceColour() {
   bool gap = below > max(stands, 1.0 / LAYERS) && layerOut < LAYERS;
   if (own >= 1.0 || below <= 0.0 || gap) discard;
   vec3 tangent = normalize(alongOut * TILT + up);
-  // What the uppermost shell shows of a hair is its tip, however far shells are apart.
-  float darker = DECAY * max(below - 1.0 / LAYERS, 0.0), depth = DECAY * own + darker;
+  // What the uppermost shell shows of a hair is its tip, however far shells are apart; and what is
+  // seen on the skin, between shells, is no darker than the foot of a hair.
+  float darker = DECAY * clamp(below - 1.0 / LAYERS, 0.0, STANDS), depth = DECAY * own + darker;
   float lamp = lampLight(tangent, lampOut, view, up, depth, darker);
   float lamps = HEADLIGHT * lampLight(tangent, view, view, up, depth, darker) + LAMP * lamp;
   return texel.rgb * (SKY * exp(-BELOW * darker) + lamps)
