@@ -12,8 +12,9 @@ all that is brighter, the last all that is darker, or, where `tails` is "dropped
 [Imin, Imax] has the code 255; so has what `opaque` has below 128. With s = floor(255 / N), within
 the layer the code is (n - 1) s + min(floor(s clamp(N ln(Imax / L) / a - n + 1)), s - 1), a =
 `attenuation`. A texture holds colours and, in alpha, codes; beyond [0, 1] it is repeated mirrored,
-and interpolated linearly, without mipmaps: colours after they were decoded from sRGB, alpha as it
-is. code = floor(255 alpha + 0.5) in the following.
+and interpolated linearly, in the plain look without mipmaps, in the full one with isotropic ones:
+colours after they were decoded from sRGB, alpha as it is. code = floor(255 alpha + 0.5) in the
+following.
 
 **Lie.** `lie` has two bytes a vertex v. With n the normal and b = `backwards`, east is b - (b·n) n
 made 1 long; where that is shorter than |b| / 1000 the coordinate axis takes b's place that b has
@@ -34,11 +35,11 @@ to the sum 1. Of the photograph a corner has `patch_place` plus its place over `
 turned by `patch_direction` counter-clockwise; in widths of the photograph, from the lower left.
 
 **The full look.** Any number M of shells is drawn: shell m at depth d = m / M. A vertex is lifted
-by `thickness` times its hair's length times (h n + h² (BEND direction + wind)), h = 1 - d. A
-fragment takes of its three patches, but for weights below 0.02, the texel whose weight times
-HEIGHT_OF_WEIGHT less alpha is greatest. Its own depth is o = code / (N s), to be drawn at o' =
-clamp(`middle` + SPREAD (o - `middle`), 0, 0.999); it is dropped where o >= 1, o' >= d, or, but for
-the last shell, d - o' > max(s', 1 / M), s' = STANDS times EDGE where the surface is seen from
+by `thickness` times its hair's length times (h n + h² (BEND direction + wind)), h = 1 - (m - 1/2) /
+M, of the last one 0. A fragment takes of its three patches, but for weights below 0.02, the texel
+whose weight times HEIGHT_OF_WEIGHT less alpha is greatest. Its own depth is o = code / (N s), to be
+drawn at o' = clamp(`middle` + SPREAD (o - `middle`), 0, 0.999); it is dropped where o >= 1, o' >= d,
+or, but for the last shell, d - o' > max(s', 1 / M), s' = STANDS times EDGE where the surface is seen from
 aside, STANDS where it is seen from above, smoothstep between at EDGE_TO. Light, wind and the names
 in capitals: `fur_laid_fragment.glsl`, `fur_laid_vertex.glsl` and the parameter `constants`.
 
