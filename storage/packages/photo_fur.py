@@ -39,9 +39,10 @@ by `thickness` times its hair's length times (h n + h² (BEND direction + wind))
 M, of the last one 0. A fragment takes of its three patches, but for weights below 0.02, the texel
 whose weight times HEIGHT_OF_WEIGHT less alpha is greatest. Its own depth is o = code / (N s), to be
 drawn at o' = clamp(`middle` + SPREAD (o - `middle`), 0, 0.999); it is dropped where o >= 1, o' >=
-d, or, but for the last shell, d - o' > max(s', 1 / M), s' = STANDS times EDGE where the surface is seen from
-aside, STANDS where it is seen from above, smoothstep between at EDGE_TO. Light, wind and the names
-in capitals: `fur_laid_fragment.glsl`, `fur_laid_vertex.glsl` and the parameter `constants`.
+d, or, but for the last shell, d - o' > max(s', 1 / M), s' = STANDS times EDGE where the surface is
+seen from aside, STANDS where it is seen from above, smoothstep between at EDGE_TO. Light, wind and
+the names in capitals: `fur_laid_fragment.glsl`, `fur_laid_vertex.glsl` and the parameter
+`constants`.
 
 **The plain look** is the paper's: layer n of N is the mesh with its vertices moved along their
 normals by `thickness` (1 - n / N), with the mesh's texture coordinates. A fragment of layer n is
