@@ -73,7 +73,7 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "lie_field": {"shell_mesh"},
         "fur_patches": {"fur_photo", "shell_mesh", "lie_field"},
         "fur_frames": {"fur_photo", "attenuation", "shell_mesh", "lie_field", "fur_patches"},
-        "fur_package": {"fur_photo", "attenuation", "shell_mesh"},
+        "fur_package": {"fur_photo", "attenuation", "shell_mesh", "lie_field", "fur_patches"},
     }
     assert _parents(house, BTF) == {
         "btf_images": set(),

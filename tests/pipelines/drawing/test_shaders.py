@@ -21,7 +21,7 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.glsl import SHADERS, Shader, shader_source, surface_shader
 from pipelines.drawing.stage import Stage, orbit, surface, texture
 from pipelines.light.directions import stereographic_of_vectors
-from pipelines.photo_fur.laid_fur import SHADING
+from pipelines.photo_fur.laid_fur import constants
 from pipelines.ssdf_lighting.distances.edge_share import edge_share
 from pipelines.ssdf_lighting.distances.octahedral import directions_of, square_of
 from pipelines.street_billboards.textures.view_directions import fan_position
@@ -113,9 +113,9 @@ _FUR_SHELL: dict[str, Any] = {
     "LAMP_TOWARDS": [0.0, 0.6, 0.8],
 }
 _FUR_LAID: dict[str, Any] = {
-    **{name: value for name, value in _FUR_SHELL.items() if name != "THICKNESS"},
-    **{"BEND": 0.6, "HEIGHT_OF_WEIGHT": 0.5, "GLOSS": 0.1},
-    **SHADING,
+    **{name: value for name, value in _FUR_SHELL.items() if name != "CODE_STEPS"},
+    **{"CODES": 250.0, "MIDDLE": 0.5, "WIND": 0.4, "MOMENT": 1.5, "GUST": 3.0},
+    **constants(),
 }
 _GRID: dict[str, Any] = {
     "GRID_START": [0.05, 0.02],
