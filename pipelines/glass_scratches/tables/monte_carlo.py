@@ -16,6 +16,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
+from pipelines.glass_scratches.tables.random_numbers import next_number
 from pipelines.glass_scratches.tables.walls import bounce_blur, check_albedo
 
 PLACES = 16
@@ -107,17 +108,6 @@ def table_of_counts(counts: PathCounts) -> PathTable:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _next(state):  # type: ignore[no-untyped-def]
-    """One step of splitmix64: new state, and a double in [0, 1)."""
-    state = state + np.uint64(0x9E3779B97F4A7C15)
-    z = state
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return state, np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
-
-
-@njit(cache=True, nogil=True, inline="always")
 def _folded(sine):  # type: ignore[no-untyped-def]
     """A number reflected at -1 and 1 until it lies between."""
     turn = np.fmod(sine + 1.0, 4.0)
@@ -170,15 +160,15 @@ def _shoot_from(walls, sines, bin_in, seed, counts):  # type: ignore[no-untyped-
     state = np.uint64(seed) * np.uint64(0xD1342543DE82EF95) + np.uint64(bin_in + 1) * np.uint64(
         0xAF251AF3B0F025B5
     )
-    state, _ = _next(state)
+    state, _ = next_number(state)
     leaving, squares = counts.leaving[bin_in], counts.squares[bin_in]
     own = np.zeros(len(squares), np.int64)  # of the ray's paths, by the bin that they leave into
     touched = np.empty(counts.paths_per_ray, np.int64)
     for _ray in range(counts.rays):
-        state, u = _next(state)
+        state, u = next_number(state)
         place = min(int(u * len(leaving)), len(leaving) - 1)
         x = walls.x[0] + walls.opening * u
-        state, u = _next(state)
+        state, u = next_number(state)
         sine = sines[bin_in] + u * (sines[bin_in + 1] - sines[bin_in])
         ray = _Ray(-1, x, 0.0, -sine, -np.sqrt(max(1.0 - sine * sine, 0.0)))
         piece, along = _hit(walls, ray)
@@ -209,7 +199,7 @@ def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-unty
     """
     dx, dy = ray.dx, ray.dy
     for _bounce in range(_BOUNCES):
-        state, u = _next(state)
+        state, u = next_number(state)
         if u >= walls.albedo:
             return state, _KEPT
         sine_in = dx * walls.along_x[piece] + dy * walls.along_y[piece]
@@ -226,11 +216,11 @@ def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-unty
 @njit(cache=True, nogil=True, inline="always")
 def _bounced_sine(sine, blur, state):  # type: ignore[no-untyped-def]
     """Random state, and the sine after a bounce, to the facet's normal, of the one before."""
-    state, u = _next(state)
+    state, u = next_number(state)
     if np.isinf(blur):
         return state, 2.0 * u - 1.0
     if blur > 0.0:
-        state, v = _next(state)
+        state, v = next_number(state)
         normal = np.sqrt(-2.0 * np.log(1.0 - u)) * np.cos(2.0 * np.pi * v)
         sine = _folded(sine + blur * normal)
     return state, sine

@@ -56,7 +56,13 @@ class ExactTable(NamedTuple):
 
 def view_factors(profile: NDArray[np.float64], bins: int, facets: int) -> ViewFactors:
     """All factors of a profile (P, 2) cut into about ``facets`` facets."""
-    ends = facet_ends(profile, facets)
+    return factors_of_ends(profile, facet_ends(profile, facets), bins)
+
+
+def factors_of_ends(
+    profile: NDArray[np.float64], ends: NDArray[np.float64], bins: int
+) -> ViewFactors:
+    """All factors of a profile (P, 2) cut into facets at these ends (J + 1, 2)."""
     strings = taut_strings(profile, ends, bin_edges(bins))
     d, far = strings.between, strings.beyond
     between = (d[:-1, :-1] + d[1:, 1:] - d[:-1, 1:] - d[1:, :-1]) / 2
@@ -113,9 +119,16 @@ def leaving_share(rho: NDArray[np.float64]) -> NDArray[np.float64]:
 def seen_facets(factors: ViewFactors, bins: int, places: int) -> NDArray[np.int64]:
     """The facet seen at each of ``places`` points across the opening from each bin's middle,
     (places, bins); places count from the left end, at the middles of equal parts."""
+    across = factors.ends[0, 0] + factors.width * (np.arange(places) + 0.5) / places
+    return facets_along(factors, np.repeat(across[:, None], bins, axis=1))
+
+
+def facets_along(factors: ViewFactors, across: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The facet that is seen first at places v (places, M) of the opening, one for each bin's
+    middle."""
     ends = factors.ends
-    across = ends[0, 0] + factors.width * (np.arange(places) + 0.5) / places
-    seen = np.zeros((places, bins), np.int64)
+    bins = across.shape[1]
+    seen = np.zeros(across.shape, np.int64)
     start, step = ends[:-1], np.diff(ends, axis=0)
     for column, angle in enumerate(bin_centres(bins)):
         # Sheared along the direction, every ray is a line of constant v.
@@ -123,7 +136,7 @@ def seen_facets(factors: ViewFactors, bins: int, places: int) -> NDArray[np.int6
         low = start[:, 0] - shift * start[:, 1]
         width = step[:, 0] - shift * step[:, 1]
         with np.errstate(divide="ignore", invalid="ignore"):
-            along = (across[:, None] - low) / width
+            along = (across[:, column, None] - low) / width
         height = np.where(
             (along >= 0) & (along <= 1) & (width > 0), start[:, 1] + along * step[:, 1], -np.inf
         )

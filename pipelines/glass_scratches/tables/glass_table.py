@@ -1,0 +1,185 @@
+"""The table of a scratch whose walls are glass: reflection and transmission, from both sides.
+
+Rows and columns are bins of phi on both sides, as `glass_paths` has them: M outside, M inside. A beam
+from bin i leaves into bin o with probability rho[o, i] w[o] r[o] / pi, where w is the integral of
+cos phi over the bin, and r is 1 outside; inside it is the ratio of the two sides' étendue: n² where
+walls forget the lean, k_inside / k_outside where they keep it (from a lean of 1 on, where there is
+only the inside, 1). So rho is symmetric: radiance over n² is reciprocal.
+
+Walls that scatter evenly are solved for (`glass_radiosity`). Of clear and ground ones paths are
+counted (`glass_paths`), a table for each of a few leans. Counts lose nothing, but are reciprocal only
+as far as noise goes: the table is their mean with their transpose, its rows and columns scaled
+alike until each beam is whole again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.glass_paths import GlassPaths, shoot_glass_paths
+from pipelines.glass_scratches.tables.glass_radiosity import (
+    facets_of_views,
+    factors_of_both_sides,
+    solve_glass,
+)
+from pipelines.glass_scratches.tables.groove_walls import groove_walls
+from pipelines.glass_scratches.tables.monte_carlo import PLACES
+from pipelines.glass_scratches.tables.walls import check_roughness
+
+LEANS = (0.0, 0.35, 0.55, 0.7, 0.82, 0.91, 0.97)
+"""That tables of walls which keep the lean are made for; and one from 1 on."""
+STEEPEST = 0.6
+"""Slope of the ridges of walls of roughness just below 1."""
+_FINE = 16
+_CLOSED = 1e-13
+_ROUNDS = 10_000
+
+
+class GlassTable(NamedTuple):
+    """Tables of S leans: ``rho``, ``standard_error`` (S, 2 M out, 2 M in) float64, the error 0 where
+    it was solved for; ``absorbed`` (S, 2 M); ``across`` (S, places, 2 M view, 2 M light) float32:
+    rho by the place where the view's ray crosses the opening, the mean of which is rho; ``leans``
+    (S,), the last being 1 where walls keep the lean, or 0 alone where they forget it."""
+
+    rho: NDArray[np.float64]
+    standard_error: NDArray[np.float64]
+    absorbed: NDArray[np.float64]
+    across: NDArray[np.float32]
+    leans: NDArray[np.float64]
+
+
+def glass_table(
+    profile: NDArray[np.float64],
+    *,
+    bins: int,
+    index: float,
+    roughness: float = 1.0,
+    albedo: float = 1.0,
+    facets: int = 128,
+    rays: int = 40_000,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> GlassTable:
+    """The table of a profile (P, 2) in glass of this index, M = ``bins``.
+
+    roughness: 1 walls scatter evenly (the paper's), solved for with ``facets`` facets; 0 they are
+    clear; between, ground to ridges with slopes of standard deviation 0.6 roughness. Of those
+    ``rays`` paths a bin are counted. albedo: what walls do not keep of light each time.
+
+    Raises ValueError for a roughness or an albedo outside [0, 1], and where walls as rough would
+    cross.
+
+    >>> from pipelines.glass_scratches.tables.profiles import built_in_profile
+    >>> even = glass_table(built_in_profile("v", 10.0, 4.0), bins=8, index=1.5, facets=20)
+    >>> even.rho.shape, even.leans.tolist()
+    ((1, 16, 16), [0.0])
+    >>> bool(np.allclose(beam_shares(even.rho[0], side_ratio(0.0, 1.5, keeps=False)), 1.0))
+    True
+    """
+    check_roughness(roughness)
+    if roughness == 1.0:
+        return _even_table(profile, bins, index, albedo, facets)
+    walls = groove_walls(profile, STEEPEST * roughness, seed)
+    tables = []
+    leans = (*LEANS, 1.0)
+    for number, lean in enumerate(leans):
+        counted = shoot_glass_paths(
+            walls, lean, bins=bins, index=index, rays=rays, albedo=albedo, seed=seed + number
+        )
+        tables.append(table_of_glass_paths(counted, side_ratio(lean, index, keeps=True)))
+        progress((number + 1) / len(leans))
+    parts = (np.stack(part) for part in zip(*tables, strict=True))
+    return GlassTable(*parts, np.array(leans))
+
+
+def side_ratio(lean: float, index: float, *, keeps: bool) -> float:
+    """r of the inside: étendue there over that outside, of a lean (or of all)."""
+    if not keeps:
+        return index**2
+    if lean >= 1.0:
+        return 1.0
+    return float(np.sqrt((index**2 - lean**2) / (1.0 - lean**2)))
+
+
+def side_weights(bins: int, ratio: float) -> NDArray[np.float64]:
+    """w r / pi (2 M,) of the bins of both sides: rho times this is the part of a beam."""
+    weight = bin_weights(bins) / np.pi
+    return np.concatenate([weight, ratio * weight])
+
+
+def beam_shares(rho: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+    """Part (2 M,) of the beam of each bin that leaves again, by a table (2 M, 2 M)."""
+    return side_weights(len(rho) // 2, ratio) @ rho
+
+
+def _even_table(
+    profile: NDArray[np.float64], bins: int, index: float, albedo: float, facets: int
+) -> GlassTable:
+    factors = factors_of_both_sides(profile, bins, facets)
+    solved = solve_glass(factors, index, albedo)
+    weights = side_weights(bins, index**2)
+    rho = solved.leaving / weights[:, None]
+    rho = (rho + rho.T) / 2  # to the last bit
+    seen = facets_of_views(factors, bins, PLACES * _FINE)
+    across = np.empty((PLACES, 2 * bins, 2 * bins))
+    for view in range(2 * bins):
+        shown = solved.from_facets[:, seen[:, view]] / weights[:, None]
+        across[:, view] = shown.reshape(2 * bins, PLACES, _FINE).mean(axis=2).T
+    return GlassTable(
+        rho[None],
+        np.zeros((1, *rho.shape)),
+        solved.kept[None],
+        _with_mean(across, rho)[None],
+        np.zeros(1),
+    )
+
+
+def table_of_glass_paths(
+    paths: GlassPaths, ratio: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    """rho, its standard error, what walls keep, and rho across the opening, of counted paths.
+
+    The error is that of independent paths in both directions; stratified ones have less.
+    """
+    weights = side_weights(paths.leaving.shape[-1] // 2, ratio)
+    shot = paths.leaving.sum(axis=(1, 2)) + paths.kept > 0
+    mean = paths.leaving.sum(axis=1) / paths.rays
+    error2 = mean * (1.0 - mean) / paths.rays
+    counted = (mean / weights).T  # (out, in)
+    variance = (error2 / weights**2).T
+    kept = paths.kept / paths.rays
+    rho = np.where(np.outer(shot, shot), (counted + counted.T) / 2, 0.0)
+    rho = _closed(rho, weights, np.where(shot, 1.0 - kept, 0.0))
+    across = paths.leaving.transpose(1, 0, 2) * (PLACES / paths.rays) / weights
+    return rho, np.sqrt(variance + variance.T) / 2, kept, _with_mean(across, rho)
+
+
+def _closed(
+    rho: NDArray[np.float64], weights: NDArray[np.float64], shares: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A symmetric table with rows and columns scaled alike so that beams leave by their shares.
+
+    Sinkhorn and Knopp's iteration, of a symmetric matrix.
+    """
+    scale = np.sqrt(np.where(shares > 0, 1.0, 0.0))
+    for _ in range(_ROUNDS):
+        sums = scale * (rho @ (weights * scale))
+        off = np.divide(shares, sums, out=np.zeros_like(sums), where=sums > 0)
+        scale = scale * np.sqrt(off)
+        if np.abs(sums - shares).max() < _CLOSED:
+            break
+    closed: NDArray[np.float64] = rho * scale[:, None] * scale
+    return closed
+
+
+def _with_mean(across: NDArray[np.float64], rho: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Tables of places (P, 2 M view, 2 M light), scaled so that their mean is exactly rho."""
+    mean = across.mean(axis=0)
+    scale = np.divide(rho, mean, out=np.zeros_like(rho), where=mean > 0)
+    # Where no path of this direction was counted, but one of the other was, no place is known.
+    return np.where(mean > 0, across * scale, rho).astype(np.float32)

@@ -1,0 +1,249 @@
+"""Grooves of glass as solid things in space, path-traced by Mitsuba: a reference for the table.
+
+Nothing here knows the two dimensions of the table. Walls of Mitsuba's own smooth dielectric stand in
+space, groove beside groove, u along them, v across and n upwards; below them all is glass. They are
+looked at from directions of one bin, from above or from inside the glass, in an environment that glows
+in a band of phi alone. What is seen, over n² inside, is the part of the bin's beam that leaves into
+the band.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.glass_scratches.tables.bins import bin_edges
+from pipelines.glass_scratches.tables.glass_paths import shoot_glass_paths
+from pipelines.glass_scratches.tables.glass_table import (
+    side_ratio,
+    side_weights,
+    table_of_glass_paths,
+)
+from pipelines.glass_scratches.tables.groove_walls import GrooveWalls, groove_points, groove_walls
+from pipelines.glass_scratches.tables.profiles import built_in_profile
+
+BINS, INDEX = 64, 1.5
+LEANS = (0.0, 0.55, 0.82)
+BAND = 4
+"""Bins of a band of light."""
+LEAST = 0.02
+"""Part of a beam that a band gets at least, to be compared."""
+PATHS = 1 << 17
+_PARTS = 128
+"""Of a view's bin, which is looked at from a direction drawn at random in each of them."""
+_BESIDE = 6
+"""Grooves to each side of those that are looked at."""
+_REACH = 40.0
+"""Length of the walls to each side, in widths of a groove."""
+_TEXELS = 16
+"""Of the environment a bin: it is linear between them."""
+_RAYS = 400_000
+
+
+class Pair(NamedTuple):
+    """A lean, the bin of a view, the first bin of a band of light; bins from ``BINS`` on are inside."""
+
+    lean: float
+    view: int
+    light: int
+
+
+class Compared(NamedTuple):
+    """Parts of the view's beam in the band by Mitsuba and by the table, and their standard errors."""
+
+    pair: Pair
+    traced: float
+    traced_error: float
+    table: float
+    table_error: float
+
+
+def compare(profile: NDArray[np.float64], slope: float, count: int, seed: int) -> list[Compared]:
+    """``count`` pairs of each of outside and inside light, for walls of this slope (0: clear).
+
+    Which bins are compared is drawn at random, among those whose band gets 2 % or more.
+    """
+    rng = np.random.default_rng(seed)
+    walls = groove_walls(profile, slope, seed)
+    found: list[Compared] = []
+    solid = _solid(walls)
+    tables = {lean: _beams(walls, lean, seed) for lean in LEANS}
+    wanted = {False: count, True: count}
+    while any(left > 0 for left in wanted.values()):
+        lean = float(rng.choice(LEANS))
+        view = int(rng.integers(2 * BINS))
+        beams, errors = tables[lean]
+        bands = [
+            first
+            for first in range(0, 2 * BINS, BAND)
+            if beams[first : first + BAND, view].sum() >= LEAST and wanted[first >= BINS] > 0
+        ]
+        for first in rng.permutation(bands)[:3]:
+            wanted[bool(first >= BINS)] -= 1
+            rows = slice(first, first + BAND)
+            traced, error = _traced(solid, len(walls.x), Pair(lean, view, int(first)), rng)
+            own = float(np.sqrt((errors[rows, view] ** 2).sum()))
+            found.append(
+                Compared(
+                    Pair(lean, view, int(first)), traced, error, float(beams[rows, view].sum()), own
+                )
+            )
+    return found
+
+
+def reference_figures(count: int = 160, seed: int = 0) -> dict[str, float]:
+    """Clear and ground walls of a V, ``count`` pairs each to either side."""
+    profile = built_in_profile("v", 10.0, 4.0)
+    pairs = [*compare(profile, 0.0, count, seed), *compare(profile, 0.3, count, seed + 1)]
+    return {
+        "dielectric_reference_z_rms": z_rms(pairs),
+        "dielectric_pairs_outside": sum(one.pair.light < BINS for one in pairs),
+        "dielectric_pairs_inside": sum(one.pair.light >= BINS for one in pairs),
+        "dielectric_worst_se": max(one.traced_error / one.traced for one in pairs),
+        "dielectric_null_z_rms": z_rms(
+            [one._replace(table=_same_everywhere(one, pairs)) for one in pairs]
+        ),
+    }
+
+
+def z_rms(pairs: list[Compared]) -> float:
+    """RMS of (traced - table) / standard error of both."""
+    z = [(one.traced - one.table) / np.hypot(one.traced_error, one.table_error) for one in pairs]
+    return float(np.sqrt(np.mean(np.square(z))))
+
+
+def _same_everywhere(one: Compared, pairs: list[Compared]) -> float:
+    """A table that knows nothing: the mean of what all bands get on that side."""
+    same = [other.table for other in pairs if (other.pair.light < BINS) == (one.pair.light < BINS)]
+    return float(np.mean(same))
+
+
+def _beams(
+    walls: GrooveWalls, lean: float, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Parts of beams (2 M out, 2 M in) by the table of a lean, and their standard errors."""
+    ratio = side_ratio(lean, INDEX, keeps=True)
+    paths = shoot_glass_paths(walls, lean, bins=BINS, index=INDEX, rays=_RAYS, seed=seed)
+    rho, error, _, _ = table_of_glass_paths(paths, ratio)
+    weights = side_weights(BINS, ratio)[:, None]
+    return rho * weights, error * weights
+
+
+@functools.cache
+def _mitsuba() -> Any:
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
+    return mitsuba
+
+
+def _solid(walls: GrooveWalls) -> dict[str, Any]:
+    """Walls in space: all grooves once, and more of them to both sides."""
+    points = groove_points(walls)
+    grooves = len(points)
+    shapes = {}
+    for number in range(-_BESIDE, grooves + _BESIDE):
+        corners = points[number % grooves] + [number, 0.0]
+        for piece in range(len(corners) - 1):
+            start, end = corners[piece], corners[piece + 1]
+            # Seen from the air, up (along v, n) is left of right (along u) … its normal is the air's.
+            shapes[f"wall {number + _BESIDE} {piece}"] = _rectangle(
+                [0.0, *(start + end) / 2], [_REACH, 0.0, 0.0], [0.0, *(end - start) / 2]
+            )
+    return shapes
+
+
+def _rectangle(middle: list[float], right: list[float], up: list[float]) -> dict[str, Any]:
+    normal = np.cross(right, up)
+    frame = np.eye(4)
+    frame[:3] = np.stack([right, up, normal / np.linalg.norm(normal), middle], axis=1)
+    return {
+        "type": "rectangle",
+        "to_world": _mitsuba().ScalarTransform4f(frame),
+        "material": {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
+    }
+
+
+def _traced(
+    solid: dict[str, Any], grooves: int, pair: Pair, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Part of the view's beam that Mitsuba's paths take into the band, and its standard error."""
+    mi = _mitsuba()
+    inside = pair.view >= BINS
+    edges = np.sin(bin_edges(BINS))
+    low, high = edges[pair.view % BINS : pair.view % BINS + 2]
+    sines = low + (high - low) * (np.arange(_PARTS) + rng.random(_PARTS)) / _PARTS
+    u = pair.lean / (INDEX if inside else 1.0)
+    across = np.sqrt(1.0 - u * u)
+    up = across * np.sqrt(1.0 - sines * sines) * (-1.0 if inside else 1.0)
+    views = np.stack([np.full(_PARTS, u), across * sines, up], axis=-1)
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": -1, "rr_depth": 1 << 20},
+            "light": _band(pair.light),
+            **{f"sensor {number}": _sensor(view, grooves) for number, view in enumerate(views)},
+            **solid,
+        },
+        optimize=False,
+    )
+    seeds = rng.integers(1 << 31, size=_PARTS)
+    seen = np.array(
+        [
+            np.array(mi.render(scene, sensor=number, seed=int(seed))).ravel()[0]
+            for number, seed in enumerate(seeds)
+        ],
+        np.float64,
+    )
+    # Mitsuba counts radiance, which is n² times as large inside.
+    seen *= (INDEX**2 if pair.light >= BINS else 1.0) / (INDEX**2 if inside else 1.0)
+    # Neighbouring parts differ by their paths, by where in them was looked from, and a little by
+    # what is different there.
+    error = np.sqrt(np.square(np.diff(seen)).sum() / 2.0) / _PARTS
+    return float(seen.mean()), float(error)
+
+
+def _sensor(view: NDArray[np.float64], grooves: int) -> dict[str, Any]:
+    mi = _mitsuba()
+    frame = np.eye(4)
+    frame[:3, 0], frame[:3, 1] = [0.5, 0.0, 0.0], [0.0, grooves / 2, 0.0]
+    frame[:3, 3] = [0.0, grooves / 2, 0.0]
+    return {
+        "type": "distant",
+        "direction": (-view).tolist(),
+        "target": {"type": "rectangle", "to_world": mi.ScalarTransform4f(frame)},
+        "film": {
+            "type": "hdrfilm",
+            "width": 1,
+            "height": 1,
+            "rfilter": {"type": "box"},
+            "pixel_format": "luminance",
+            "component_format": "float32",
+        },
+        "sampler": {"type": "independent", "sample_count": PATHS // _PARTS},
+    }
+
+
+def _band(first: int) -> dict[str, Any]:
+    """An environment of radiance 1 in ``BAND`` bins, whatever the lean."""
+    mi = _mitsuba()
+    columns = np.zeros(2 * BINS * _TEXELS, np.float32)
+    # Once around u, from the normal over v: phi outside, then phi inside from the other horizon.
+    phi = (np.arange(len(columns)) + 0.5) / len(columns) * 2 * np.pi - np.pi / 2
+    outside = phi < np.pi / 2
+    bins = np.where(
+        outside, (phi / np.pi + 0.5) * BINS, BINS + ((np.pi - phi) / np.pi + 0.5) * BINS
+    )
+    columns[(bins >= first) & (bins < first + BAND)] = 1.0
+    image = np.repeat(np.repeat(columns[None, :, None], 4, axis=0), 3, axis=2)
+    # Mitsuba's map turns about its own y, from -z, where it begins, over x: from -v over n, about u.
+    turn = np.eye(4)
+    turn[:3, 1], turn[:3, 2], turn[:3, 0] = [1, 0, 0], [0, 1, 0], [0, 0, 1]
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(image),
+        "to_world": mi.ScalarTransform4f(turn),
+    }
