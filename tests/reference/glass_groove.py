@@ -1,10 +1,10 @@
 """Grooves of glass as solid things in space, path-traced by Mitsuba: a reference for the table.
 
-Nothing here knows the two dimensions of the table. Walls of Mitsuba's own smooth dielectric stand in
-space, groove beside groove, u along them, v across and n upwards; below them all is glass. They are
-looked at from directions of one bin, from above or from inside the glass, in an environment that glows
-in a band of phi alone. What is seen, over n² inside, is the part of the bin's beam that leaves into
-the band.
+Nothing here knows the two dimensions of the table. Walls of Mitsuba's own smooth dielectric stand
+in space, groove beside groove, u along them, v across and n upwards; below them all is glass. They
+are looked at from directions of one bin, from above or from inside the glass, in an environment
+that glows in a band of phi alone. What is seen, over n² inside, is the part of the bin's beam that
+leaves into the band.
 """
 
 from __future__ import annotations
@@ -16,12 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_edges
+from pipelines.glass_scratches.tables.bsdf_table import side_ratio, side_weights
 from pipelines.glass_scratches.tables.glass_paths import shoot_glass_paths
-from pipelines.glass_scratches.tables.glass_table import (
-    side_ratio,
-    side_weights,
-    table_of_glass_paths,
-)
+from pipelines.glass_scratches.tables.glass_table import table_of_glass_paths
 from pipelines.glass_scratches.tables.groove_walls import GrooveWalls, groove_points, groove_walls
 from pipelines.glass_scratches.tables.profiles import built_in_profile
 
@@ -44,7 +41,8 @@ _RAYS = 400_000
 
 
 class Pair(NamedTuple):
-    """A lean, the bin of a view, the first bin of a band of light; bins from ``BINS`` on are inside."""
+    """A lean, the bin of a view, the first bin of a band of light; bins from ``BINS`` on are
+    inside."""
 
     lean: float
     view: int
@@ -52,7 +50,8 @@ class Pair(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """Parts of the view's beam in the band by Mitsuba and by the table, and their standard errors."""
+    """Parts of the view's beam in the band by Mitsuba and by the table, and their standard
+    errors."""
 
     pair: Pair
     traced: float
@@ -149,7 +148,8 @@ def _solid(walls: GrooveWalls) -> dict[str, Any]:
         corners = points[number % grooves] + [number, 0.0]
         for piece in range(len(corners) - 1):
             start, end = corners[piece], corners[piece + 1]
-            # Seen from the air, up (along v, n) is left of right (along u) … its normal is the air's.
+            # Seen from the air, up (along v, n) is left of right (along u) … its normal is the
+            # air's.
             shapes[f"wall {number + _BESIDE} {piece}"] = _rectangle(
                 [0.0, *(start + end) / 2], [_REACH, 0.0, 0.0], [0.0, *(end - start) / 2]
             )
@@ -239,7 +239,8 @@ def _band(first: int) -> dict[str, Any]:
     )
     columns[(bins >= first) & (bins < first + BAND)] = 1.0
     image = np.repeat(np.repeat(columns[None, :, None], 4, axis=0), 3, axis=2)
-    # Mitsuba's map turns about its own y, from -z, where it begins, over x: from -v over n, about u.
+    # Mitsuba's map turns about its own y, from -z, where it begins, over x: from -v over n, about
+    # u.
     turn = np.eye(4)
     turn[:3, 1], turn[:3, 2], turn[:3, 0] = [1, 0, 0], [0, 1, 0], [0, 0, 1]
     return {

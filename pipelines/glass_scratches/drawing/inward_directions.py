@@ -1,9 +1,8 @@
 """Where light goes that a scratch scatters into the glass, compiled.
 
-Half of the directions are drawn by the cosine; half aim at what is bright in the environment as it
-is seen through a face parallel to this one, or to one of the solid's flat faces. Total reflection
-on the way only mirrors: for a plate that covers whatever becomes of the light, for thin walls most
-of it.
+Directions aim at what is bright in the environment as it is seen through a face parallel to this
+one, or to one of the solid's flat faces. Total reflection on the way only mirrors: for a plate that
+covers whatever becomes of the light, for thin walls most of it.
 """
 
 from __future__ import annotations
@@ -36,10 +35,10 @@ def aimed_inward(environment, flats, normal, index, numbers):  # type: ignore[no
 
 @njit(cache=True, nogil=True)
 def inward_pdf(environment, flats, normal, index, way):  # type: ignore[no-untyped-def]
-    """Density per steradian of directions (x, y, z), half by the cosine and half aimed."""
+    """Density per steradian of the directions (x, y, z) of `aimed_inward`."""
     axes = _axis_count(flats, normal)
     below = -dot(way, normal)
-    density = 0.5 * max(below, 0.0) / np.pi
+    density = 0.0
     for mirrored in range(2):
         from_here = stepped(way, 2.0 * below, normal) if mirrored else way
         for number in range(axes):
@@ -56,7 +55,7 @@ def inward_pdf(environment, flats, normal, index, way):  # type: ignore[no-untyp
                     index * across[1] + onward * axis[1],
                     index * across[2] + onward * axis[2],
                 )
-                density += 0.5 / axes * there * index * index * abs(inner) / outer
+                density += 1.0 / axes * there * index * index * abs(inner) / outer
     return density
 
 

@@ -21,7 +21,7 @@ from pipelines.glass_scratches.drawing.scratch_lookup import (
     scratch_here,
     tile_point,
 )
-from pipelines.glass_scratches.drawing.scratch_scattering import AtScratch, scatter, scratch_frame
+from pipelines.glass_scratches.drawing.scratch_scattering import scatter, scratch_frame
 from pipelines.glass_scratches.drawing.smooth_glass import reflect_or_refract
 from pipelines.glass_scratches.drawing.vectors import (
     divided,
@@ -83,10 +83,10 @@ def _meet_glass(glass, paths, i, hits, depth, results):  # type: ignore[no-untyp
         set_row(results.shadow_origin, i, stepped(point.position, glass.offset, point.face))
         goes_on, frame = scratch_frame(point.normal, axis, scratch.angle)
         if goes_on:
-            at = AtScratch(frame, _lobe_place(surface.lobe, scratch.place), point.side > 0.0)
-            goes_on = scatter(glass, paths, i, at, event, u_choice, results)
+            place = _lobe_place(surface.lobe, scratch.place)
+            goes_on = scatter(glass, paths, i, frame, place, event, u_choice, results)
     else:
-        reflect_or_refract(paths, i, point, surface.refractive_index, u_choice, depth)
+        reflect_or_refract(paths, i, point, surface.lobe.index, u_choice, depth)
     if goes_on:
         side = 1.0 if dot(row_vector(paths.direction, i), point.face) > 0.0 else -1.0
         set_row(paths.origin, i, stepped(point.position, side * glass.offset, point.face))
@@ -113,7 +113,8 @@ def _surface_point(faces, paths, i, hits):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _lobe_place(lobe, across):  # type: ignore[no-untyped-def]
     """The lobe's number for a place across the opening, in [-1, 1]."""
-    return min(max(int((across + 1.0) / 2.0 * len(lobe.rho)), 0), len(lobe.rho) - 1)
+    places = lobe.rho.shape[1]
+    return min(max(int((across + 1.0) / 2.0 * places), 0), places - 1)
 
 
 @njit(cache=True, nogil=True)

@@ -17,9 +17,7 @@ class ScratchedSurface(NamedTuple):
 
     ``layers`` and their ``coverage`` averaged over 1, 2, 4 … texels a side, flat, each level from
     its ``offsets`` on, ``resolution`` texels a side at first; ``tile``: scene units a tile;
-    ``lobe`` and ``roughness`` of the walls; ``head_on``, ``gamma`` (M,): F at theta_o = 0 and the
-    exponent towards pi / 2; ``refractive_index`` of the glass; ``mean_fresnel``: F averaged
-    over the hemisphere by the cosine.
+    ``lobe`` of the scratches, with the index of the glass.
     """
 
     layers: LayerArrays
@@ -28,11 +26,6 @@ class ScratchedSurface(NamedTuple):
     resolution: int
     tile: float
     lobe: Lobe
-    roughness: float
-    head_on: NDArray[np.float64]
-    gamma: NDArray[np.float64]
-    refractive_index: float
-    mean_fresnel: float
 
 
 class Faces(NamedTuple):

@@ -1,13 +1,10 @@
 """Scratched glass by path tracing (section 3.3): rays by Embree, compiled kernels for the rest.
 
 Glass is smooth where there is no scratch: a path is reflected or refracted by Fresnel's equations,
-total reflection included. Where there is one, its table answers. What it reflects, F, is shared out
-by the table (Eq. 5), with samples of the table and of the environment combined (multiple importance
-sampling, balance heuristic). What it lets through, 1 - F, goes on into the glass: rough walls
-scatter it evenly in all directions, mirror-like ones bend it as the smooth surface does, and of
-walls in between a share equal to the roughness is scattered. From inside, rough walls let out
-(1 - mean F) / n² (that is what makes it reciprocal) and scatter the rest back. So a scratched solid
-in a uniform environment is as bright as that, and never brighter.
+total reflection included. Where there is one, its table says where light goes, on both sides of the
+surface (`tables.sampling`), with samples of table and environment combined (Eq. 5; multiple
+importance sampling, balance heuristic). So a scratched solid in a uniform environment is as bright
+as that, and never brighter.
 
 Radiance is kept divided by the square of the index around it, which is the same everywhere along an
 unscattered path.
@@ -42,12 +39,6 @@ from pipelines.glass_scratches.drawing.path_state import (
 )
 from pipelines.glass_scratches.layers.coverage import flatten_mips, mip_pyramid
 from pipelines.glass_scratches.layers.feature_search import LayerArrays
-from pipelines.glass_scratches.tables.bins import bin_weights
-from pipelines.glass_scratches.tables.fresnel import (
-    FresnelFactors,
-    check_refractive_index,
-    interpolated_fresnel,
-)
 from pipelines.glass_scratches.tables.lobe import Lobe
 from pipelines.light.environment_sampling import EnvironmentSampler
 
@@ -75,45 +66,16 @@ class TracedPicture(NamedTuple):
 
 
 def make_scratched_surface(
-    layers: LayerArrays,
-    coverage: NDArray[np.float32],
-    lobe: Lobe,
-    fresnel: FresnelFactors,
-    *,
-    roughness: float,
-    tile: float,
-    index: float,
+    layers: LayerArrays, coverage: NDArray[np.float32], lobe: Lobe, *, tile: float
 ) -> ScratchedSurface:
-    """Put layers with their coverage (L, R, R), table and glass together.
+    """Put layers with their coverage (L, R, R) and the lobe of their scratches together.
 
-    Raises ValueError for an index or tile that is not positive, and an R that is no power of two.
+    Raises ValueError for a tile that is not positive, and an R that is no power of two.
     """
-    check_refractive_index(index)
     if not tile > 0:
         raise ValueError(f"tile is {tile:g}; expected more than 0 scene units.")
     flat, offsets = flatten_mips(mip_pyramid(coverage))
-    return ScratchedSurface(
-        layers,
-        flat,
-        offsets,
-        coverage.shape[1],
-        tile,
-        lobe,
-        roughness,
-        fresnel.factor[0],
-        fresnel.gamma,
-        index,
-        _mean_fresnel(fresnel),
-    )
-
-
-def _mean_fresnel(fresnel: FresnelFactors) -> float:
-    """F over the hemisphere weighted by the cosine: cos phi dphi / 2 times (2 / pi) cos² theta."""
-    theta = (np.arange(512) + 0.5) / 512 * np.pi / 2
-    weight = np.cos(theta) ** 2 / np.sum(np.cos(theta) ** 2)
-    return float(
-        weight @ interpolated_fresnel(fresnel, theta) @ bin_weights(len(fresnel.gamma)) / 2
-    )
+    return ScratchedSurface(layers, flat, offsets, coverage.shape[1], tile, lobe)
 
 
 def trace_picture(

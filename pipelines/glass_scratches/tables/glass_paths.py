@@ -29,8 +29,8 @@ _KEPT, _LOST = -1, -2
 
 
 class GlassPaths(NamedTuple):
-    """``leaving`` (2 M in, places, 2 M out) int64: paths by where they cross the opening and the bin
-    that they leave into; ``kept`` (2 M in,): that walls kept; ``rays`` a bin."""
+    """``leaving`` (2 M in, places, 2 M out) int64: paths by where they cross the opening and the
+    bin that they leave into; ``kept`` (2 M in,): that walls kept; ``rays`` a bin."""
 
     leaving: NDArray[np.int64]
     kept: NDArray[np.int64]

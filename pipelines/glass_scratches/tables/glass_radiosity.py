@@ -4,10 +4,11 @@ A facet of such a wall forgets where light came from, but not from which side. O
 it gives back R, the mean of Fresnel's reflectance over the half space by the cosine, and lets the
 rest into the glass, evenly; of light in the glass it lets out (1 - R) / n², which makes it
 reciprocal, and gives the rest back. On each side facets see each other by the factors of
-:mod:`pipelines.glass_scratches.tables.radiosity`. Of grooves side by side (`groove_walls`) the glass
-between two is a groove upside down, which opens downwards.
+:mod:`pipelines.glass_scratches.tables.radiosity`. Of grooves side by side (`groove_walls`) the
+glass between two is a groove upside down, which opens downwards.
 
-With the flux h that facets receive on both sides, F = view factors of both, and K what a facet does,
+With the flux h that facets receive on both sides, F = view factors of both, and K what a facet
+does,
 
     h = F K h + E      and      P = G K h,
 

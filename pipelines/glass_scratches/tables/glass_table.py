@@ -1,26 +1,19 @@
-"""The table of a scratch whose walls are glass: reflection and transmission, from both sides.
-
-Rows and columns are bins of phi on both sides, as `glass_paths` has them: M outside, M inside. A beam
-from bin i leaves into bin o with probability rho[o, i] w[o] r[o] / pi, where w is the integral of
-cos phi over the bin, and r is 1 outside; inside it is the ratio of the two sides' étendue: n² where
-walls forget the lean, k_inside / k_outside where they keep it (from a lean of 1 on, where there is
-only the inside, 1). So rho is symmetric: radiance over n² is reciprocal.
+"""The table of a scratch whose walls are glass: what it reflects and lets through, both sides.
 
 Walls that scatter evenly are solved for (`glass_radiosity`). Of clear and ground ones paths are
-counted (`glass_paths`), a table for each of a few leans. Counts lose nothing, but are reciprocal only
-as far as noise goes: the table is their mean with their transpose, its rows and columns scaled
+counted (`glass_paths`), a table for each of a few leans. Counts lose nothing, but are reciprocal
+only as far as noise goes: the table is their mean with their transpose, its rows and columns scaled
 alike until each beam is whole again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.bsdf_table import BsdfTable, side_ratio, side_weights
 from pipelines.glass_scratches.tables.glass_paths import GlassPaths, shoot_glass_paths
 from pipelines.glass_scratches.tables.glass_radiosity import (
     facets_of_views,
@@ -40,19 +33,6 @@ _CLOSED = 1e-13
 _ROUNDS = 10_000
 
 
-class GlassTable(NamedTuple):
-    """Tables of S leans: ``rho``, ``standard_error`` (S, 2 M out, 2 M in) float64, the error 0 where
-    it was solved for; ``absorbed`` (S, 2 M); ``across`` (S, places, 2 M view, 2 M light) float32:
-    rho by the place where the view's ray crosses the opening, the mean of which is rho; ``leans``
-    (S,), the last being 1 where walls keep the lean, or 0 alone where they forget it."""
-
-    rho: NDArray[np.float64]
-    standard_error: NDArray[np.float64]
-    absorbed: NDArray[np.float64]
-    across: NDArray[np.float32]
-    leans: NDArray[np.float64]
-
-
 def glass_table(
     profile: NDArray[np.float64],
     *,
@@ -64,7 +44,7 @@ def glass_table(
     rays: int = 40_000,
     seed: int = 0,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> GlassTable:
+) -> BsdfTable:
     """The table of a profile (P, 2) in glass of this index, M = ``bins``.
 
     roughness: 1 walls scatter evenly (the paper's), solved for with ``facets`` facets; 0 they are
@@ -78,7 +58,7 @@ def glass_table(
     >>> even = glass_table(built_in_profile("v", 10.0, 4.0), bins=8, index=1.5, facets=20)
     >>> even.rho.shape, even.leans.tolist()
     ((1, 16, 16), [0.0])
-    >>> bool(np.allclose(beam_shares(even.rho[0], side_ratio(0.0, 1.5, keeps=False)), 1.0))
+    >>> bool(np.allclose(beam_shares(even), 1.0))  # all light goes on, on one side or the other
     True
     """
     check_roughness(roughness)
@@ -93,33 +73,13 @@ def glass_table(
         )
         tables.append(table_of_glass_paths(counted, side_ratio(lean, index, keeps=True)))
         progress((number + 1) / len(leans))
-    parts = (np.stack(part) for part in zip(*tables, strict=True))
-    return GlassTable(*parts, np.array(leans))
-
-
-def side_ratio(lean: float, index: float, *, keeps: bool) -> float:
-    """r of the inside: étendue there over that outside, of a lean (or of all)."""
-    if not keeps:
-        return index**2
-    if lean >= 1.0:
-        return 1.0
-    return float(np.sqrt((index**2 - lean**2) / (1.0 - lean**2)))
-
-
-def side_weights(bins: int, ratio: float) -> NDArray[np.float64]:
-    """w r / pi (2 M,) of the bins of both sides: rho times this is the part of a beam."""
-    weight = bin_weights(bins) / np.pi
-    return np.concatenate([weight, ratio * weight])
-
-
-def beam_shares(rho: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
-    """Part (2 M,) of the beam of each bin that leaves again, by a table (2 M, 2 M)."""
-    return side_weights(len(rho) // 2, ratio) @ rho
+    rho, error, absorbed, across = (np.stack(part) for part in zip(*tables, strict=True))
+    return BsdfTable(rho, error, absorbed, across, np.array(leans), True, index)
 
 
 def _even_table(
     profile: NDArray[np.float64], bins: int, index: float, albedo: float, facets: int
-) -> GlassTable:
+) -> BsdfTable:
     factors = factors_of_both_sides(profile, bins, facets)
     solved = solve_glass(factors, index, albedo)
     weights = side_weights(bins, index**2)
@@ -130,12 +90,14 @@ def _even_table(
     for view in range(2 * bins):
         shown = solved.from_facets[:, seen[:, view]] / weights[:, None]
         across[:, view] = shown.reshape(2 * bins, PLACES, _FINE).mean(axis=2).T
-    return GlassTable(
+    return BsdfTable(
         rho[None],
         np.zeros((1, *rho.shape)),
         solved.kept[None],
         _with_mean(across, rho)[None],
         np.zeros(1),
+        False,
+        index,
     )
 
 

@@ -1,8 +1,9 @@
 """Grooves side by side, as paths of light meet them: walls of glass, smooth or ground.
 
-A table of glass is that of a surface that holds nothing but this scratch, groove beside groove: then
-what comes from either side meets walls, and light is neither lost nor counted twice. A lone scratch
-has land beside it in place of neighbours; that differs for what a wall sends up inside the glass.
+A table of glass is that of a surface that holds nothing but this scratch, groove beside groove:
+then what comes from either side meets walls, and light is neither lost nor counted twice. A lone
+scratch has land beside it in place of neighbours; that differs for what a wall sends up inside the
+glass.
 
 Rough walls are ground by what made the scratch: fine ridges run along it, steep at random. They are
 part of the cross-section, and light meets them as it meets any wall, again and again where it must.
@@ -25,9 +26,9 @@ _TRIES = 200
 
 
 class GrooveWalls(NamedTuple):
-    """Straight pieces of grooves side by side, (G, K): where they begin, their unit directions, their
-    lengths. Glass lies on the right of them, air on the left. ``width`` of a groove; ``lowest``
-    point of all. After the last groove comes the first."""
+    """Straight pieces of grooves side by side, (G, K): where they begin, their unit directions,
+    their lengths. Glass lies on the right of them, air on the left. ``width`` of a groove;
+    ``lowest`` point of all. After the last groove comes the first."""
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
