@@ -1,34 +1,43 @@
-// Scratches by their table (section 3.3): rho over the angles of light and view across a scratch.
+// Scratches by their table: rho of LEANS leans over the angles of light and view across a scratch,
+// BINS on each side of the surface (outside, then inside the glass), a row for each view. Directions
+// have their components (u, v, n) along the scratch, across it and out of the glass.
 
 #include "pi.glsl"
 
-// Where a direction's angle across a scratch lies in the table, from one horizon, 0, to the other,
-// 1. across and normal are unit vectors, at right angles to the scratch.
-float placeAcross(vec3 direction, vec3 across, vec3 normal) {
-  return atan(dot(direction, across), max(dot(direction, normal), 0.0)) / PI + 0.5;
+const float leans[LEANS] = float[LEANS](LEAN_VALUES);
+
+// Where the angle of a direction across a scratch lies among the bins of both sides.
+float placeAcross(vec3 direction) {
+  float place = atan(direction.y, max(abs(direction.z), 1e-6)) / PI + 0.5;
+  float bins = float(BINS);
+  return clamp(place * bins, 0.5, bins - 0.5) + (direction.z > 0.0 ? 0.0 : bins);
 }
 
-// The share of light that a scratch reflects (Eq. 3 and 4), F: for a view at a place across, and by
-// its cosine to the scratch. leaning: for each place F at a right angle to the scratch, and gamma.
-float reflectedShare(sampler2D leaning, float place, float cosine) {
-  vec2 leant = texture(leaning, vec2(place, 0.5)).rg;
-  float theta = asin(clamp(abs(cosine), 0.0, 1.0));
-  float lean = pow(2.0 * theta / PI, leant.g);
-  return lean + (1.0 - lean) * leant.r;
+// The lean of a direction: what it has along the scratch, times the index where it is.
+float leanOf(vec3 direction) {
+  return direction.x * (direction.z > 0.0 ? 1.0 : INDEX);
 }
 
-// The sum of the lights' power times rho (Eq. 5) for a view at a place across the scratch.
-// table: rho, a row for each place of a view; lights: powers in row 0, directions in row 1.
-vec3 scatteredLight(sampler2D table, sampler2D lights, int count, float place, vec3 across,
-                    vec3 normal) {
-  vec3 lit = vec3(0.0);
-  for (int n = 0; n < count; n++) {
-    vec3 towards = texelFetch(lights, ivec2(n, 1), 0).xyz;
-    float falling = dot(towards, normal);
-    if (falling <= 0.0) continue;
-    vec3 power = texelFetch(lights, ivec2(n, 0), 0).rgb;
-    float rho = texture(table, vec2(placeAcross(towards, across, normal), place)).r;
-    lit += power * rho * falling;
+// The tables below and above a lean, and the share of the latter.
+vec3 tablesOf(float lean) {
+  lean = abs(lean);
+  int last = LEANS - 1;
+  if (bool(KEEPS)) {
+    if (lean >= 1.0) return vec3(float(last), float(last), 0.0);
+    last -= 1;
   }
-  return lit;
+  if (last == 0 || lean >= leans[last]) return vec3(float(last), float(last), 0.0);
+  int low = 0;
+  while (leans[low + 1] <= lean) low++;
+  return vec3(float(low), float(low + 1), (lean - leans[low]) / (leans[low + 1] - leans[low]));
+}
+
+// Rho between two tables.
+float tabulated(sampler2D table, vec3 tables, float view, float light) {
+  float rows = 2.0 * float(BINS);
+  vec2 place = vec2(light, view) / rows;
+  float low = texture(table, vec2(place.x, (place.y + tables.x) / float(LEANS))).r;
+  if (tables.z == 0.0) return low;
+  float high = texture(table, vec2(place.x, (place.y + tables.y) / float(LEANS))).r;
+  return mix(low, high, tables.z);
 }

@@ -1,8 +1,10 @@
 """The same glass on the stage: a shader that looks the scratch table up (section 3.3, Eq. 5).
 
-What a frame of a game would show: one reflection and one refraction looked up in the environment,
-and scratches lit by a fixed number of lights drawn from the environment by its radiance. No paths:
-what is seen through the glass is not what the inside of the glass does.
+What a frame of a game would show, without noise: what is seen is followed through the glass, bent at
+each surface; what is reflected on the way is looked up in the environment. Scratches whose walls
+scatter evenly are lit by a fixed number of lights drawn from the environment by its radiance; those
+whose walls keep the lean show what lies along it. Lights behind the glass are seen through one more
+face, parallel to the scratched one, and what light does that cannot leave there is not followed.
 """
 
 from __future__ import annotations
@@ -14,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import luminance
-from pipelines.drawing.glsl import surface_shader
+from pipelines.drawing.glsl import Value, surface_shader
 from pipelines.drawing.stage import Camera, Stage, surface, texture
-from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+from pipelines.geometry.triangle_tree import TREE_WIDTH, triangle_tree
+from pipelines.glass_scratches.tables.bsdf_table import BsdfTable, coarser
 from pipelines.light.environment_maps import solid_angles
 from pipelines.light.environment_sampling import EnvironmentSampler, sample_directions
 
@@ -26,6 +29,12 @@ if TYPE_CHECKING:
 MOST_LAYERS = 8
 """Two textures of four channels."""
 LIGHTS = 64
+TABLE_BINS = 64
+"""Bins of the table a side, at most."""
+EVENTS = 8
+"""Surfaces that a ray through a pixel is followed to."""
+_NEAREST = 1e-4
+"""Least distance to the next of them, in a solid of radius 1."""
 LAMP_EDGE = (math.cos(math.radians(2.5)), math.cos(math.radians(1.2)))
 """Cosines to the middle of a lamp between which its radiance rises from nothing to all."""
 LAMP_COLOUR = (1.0, 0.82, 0.55)
@@ -43,8 +52,8 @@ class Lamp(NamedTuple):
 class ScratchedActor:
     """A solid with its scratches on the stage, in one draw call.
 
-    ``coverage`` (L, R, R) and ``angles`` (L,) of the layers, L <= 8; ``rho`` (M, M); ``lean`` and
-    ``index`` of the glass; ``tile`` in scene units. Raises ValueError for more layers.
+    ``coverage`` (L, R, R) and ``angles`` (L,) of the layers, L <= 8; ``table`` of the scratches;
+    ``tile`` in scene units. Raises ValueError for more layers.
     """
 
     def __init__(
@@ -52,10 +61,8 @@ class ScratchedActor:
         solid: Solid,
         coverage: NDArray[np.float32],
         angles: NDArray[np.floating],
-        rho: NDArray[np.floating],
-        lean: FresnelFactors,
+        table: BsdfTable,
         *,
-        index: float,
         tile: float,
     ) -> None:
         if len(coverage) > MOST_LAYERS:
@@ -67,16 +74,27 @@ class ScratchedActor:
         filled = np.zeros((MOST_LAYERS, *coverage.shape[1:]), np.float32)
         filled[: len(coverage)] = coverage
         packed = np.moveaxis(filled[:, ::-1], 0, -1)  # a texture's row 0 is its top
+        rho = coarser(table.rho, TABLE_BINS).astype(np.float32)
+        tree = triangle_tree(self._corners.reshape(-1, 3, 3), shading.reshape(-1, 3, 3))
         self._maps = {
             "coverageA": np.ascontiguousarray(packed[..., :4]),
             "coverageB": np.ascontiguousarray(packed[..., 4:]),
-            "table": np.ascontiguousarray(rho.astype(np.float32)[::-1, :, None]),
-            "leaning": np.stack([lean.factor[0], lean.gamma, lean.gamma], axis=-1).astype(
-                np.float32
-            )[None],
+            "table": np.ascontiguousarray(rho.reshape(-1, rho.shape[2])[::-1, :, None]),
         }
-        self._angles = [round(float(angle), 7) for angle in angles]
-        self._index, self._tile = index, tile
+        self._trees = {
+            "tree": np.ascontiguousarray(tree.nodes[::-1]),
+            "corners": np.ascontiguousarray(tree.corners[::-1]),
+        }
+        self._constants: dict[str, Value] = {
+            "LAYERS": len(angles),
+            "ANGLES": [round(float(angle), 7) for angle in angles],
+            "BINS": rho.shape[2] // 2,
+            "LEANS": len(table.leans),
+            "LEAN_VALUES": [float(lean) for lean in table.leans],
+            "KEEPS": bool(table.keeps),
+            "INDEX": float(table.index),
+            "TILE": float(tile),
+        }
 
     def actor(
         self, environment: EnvironmentSampler, camera: Camera, lamp: Lamp | None = None
@@ -91,10 +109,14 @@ class ScratchedActor:
             position = np.asarray(camera.target) + 1e4 * (position - np.asarray(camera.target))
         image = np.ascontiguousarray(environment.radiance)
         textures = {
-            name: texture(values, wrap="repeat", mipmap=name.startswith("coverage"))
+            name: texture(values, wrap="repeat", mipmap=name.startswith("coverage"), anisotropic=False)
             for name, values in self._maps.items()
         }
+        textures |= {
+            name: texture(values, interpolate=False) for name, values in self._trees.items()
+        }
         textures["sky"] = texture(image, wrap="clamp")
+        textures["softSky"] = texture(soft_radiance(image), wrap="clamp")
         # A texture's rows count from the bottom: the picture's last row is row 0 there.
         rows = np.ascontiguousarray(lights[::-1])
         textures["lights"] = texture(rows, wrap="clamp", interpolate=False)
@@ -106,13 +128,12 @@ class ScratchedActor:
             shader=surface_shader(
                 "scratched_glass_vertex.glsl",
                 "scratched_glass_fragment.glsl",
-                LAYERS=len(self._angles),
-                ANGLES=self._angles,
+                **self._constants,
                 LIGHTS=lights.shape[1],
+                EVENTS=EVENTS,
+                NEAREST=_NEAREST,
+                TREE_WIDTH=TREE_WIDTH,
                 EYE=[round(float(value), 7) for value in position],
-                RELATIVE_INDEX=1.0 / self._index,
-                BASE_REFLECTANCE=((self._index - 1) / (self._index + 1)) ** 2,
-                TILE=float(self._tile),
                 THROUGH=through,
                 TO_SKY=np.eye(3).ravel().tolist(),
                 BRIGHTNESS=1.0,
@@ -159,6 +180,21 @@ def corners_apart(
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     shading = np.asarray(solid.corner_normals).reshape(-1, 3)
     return corners.reshape(-1, 3), shading, np.repeat(facing, 3, axis=0)
+
+
+def soft_radiance(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
+    """An environment (H, 2 H, 3) with at most ``TABLE_BINS`` rows, each texel the mean of its own.
+
+    >>> soft_radiance(np.ones((512, 1024, 3))).shape
+    (64, 128, 3)
+    """
+    import cv2
+
+    rows = min(len(radiance), TABLE_BINS)
+    soft: NDArray[np.float32] = cv2.resize(
+        np.asarray(radiance, np.float32), (2 * rows, rows), interpolation=cv2.INTER_AREA
+    )
+    return soft
 
 
 def environment_lights(environment: EnvironmentSampler) -> tuple[NDArray[np.float32], float]:

@@ -70,19 +70,35 @@ def beam_shares(table: BsdfTable) -> NDArray[np.float64]:
 
 
 def energy_error(table: BsdfTable) -> float:
-    """Largest part of a beam that neither leaves nor stays. Where a side has no beam it has none."""
-    whole = beam_shares(table) + table.absorbed
-    there = whole > 0.0
-    bins = table.rho.shape[-1] // 2
+    """Largest part of a beam that neither leaves nor stays; from a lean of 1 on there is no beam
+    outside."""
+    off = np.abs(beam_shares(table) + table.absorbed - 1.0)
     if table.keeps:
-        there[-1, bins:] = True
-        there[:-1] = True
-    else:
-        there[:] = True
-    return float(np.abs(whole - 1.0)[there].max())
+        off[-1, : off.shape[1] // 2] = 0.0
+    return float(off.max())
 
 
 def asymmetry(table: BsdfTable) -> float:
     """Largest |rho(o, i) - rho(i, o)| over the largest rho: generalised reciprocity, radiance over
     n²."""
     return float(np.abs(table.rho - table.rho.transpose(0, 2, 1)).max() / table.rho.max())
+
+
+def coarser(rho: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
+    """Tables (S, 2 M, 2 M) with ``bins`` bins a side at most: means, weighted as beams are.
+
+    Raises ValueError where M is no multiple of fewer bins.
+
+    >>> coarser(np.ones((1, 32, 32)), 8).shape
+    (1, 16, 16)
+    """
+    count = rho.shape[-1] // 2
+    if count <= bins:
+        return rho
+    if count % bins:
+        raise ValueError(f"bins is {bins}; expected a divisor of the table's {count}.")
+    weight = np.tile(bin_weights(count), 2)
+    share = weight.reshape(2 * bins, -1) / weight.reshape(2 * bins, -1).sum(axis=1, keepdims=True)
+    blocks = rho.reshape(len(rho), 2 * bins, count // bins, 2 * bins, count // bins)
+    mean: NDArray[np.float64] = np.einsum("svalb,va,lb->svl", blocks, share, share)
+    return mean
