@@ -207,6 +207,12 @@ def _unscratched(right: Callable[..., Any], *arguments: Any, **options: Any) -> 
     return picture._replace(scratched=picture.scratched * 0)
 
 
+def _close_view_lost(right: Callable[..., Any], picture: Any) -> Any:
+    """Scratches fill more of the close view than of the far one."""
+    clean = right(picture)
+    return clean * np.float32(0.01) if picture.normal.any(axis=2).all() else clean
+
+
 def _furnace_times(factor: float) -> Callable[..., Any]:
     def wrong(right: Callable[..., Any], *arguments: Any) -> Any:
         picture = right(*arguments)
@@ -250,6 +256,14 @@ REGRESSIONS = (
         colour,
         "to_8bit",
         lambda right, picture: right(np.asarray(picture) * 0.5),
+        KEYS,
+    ),
+    Regression("darker_view", frames, "denoised", _close_view_lost, KEYS),
+    Regression(
+        "denoised_change",
+        frames,
+        "denoised",
+        lambda right, picture: right(picture) * np.float32(0.7),
         KEYS,
     ),
     Regression(
@@ -299,7 +313,7 @@ def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
         ({"roughness": 0.5, "method": "exact"}, r"roughness is 0\.5 with the method exact"),
         ({"resolution": 100}, r"resolution is 100; expected a power of two"),
         ({"shape": "u", "profile_depth": 8.0}, r"depth of the profile is 8; expected at most 5"),
-        ({"environment": "moon"}, r"environment is 'moon'; expected lamps, sky, uniform"),
+        ({"environment": "moon"}, r"environment is 'moon'; expected room, lamps, sky, uniform"),
         ({"environment": "gone.hdr"}, r"gone\.hdr: .* missing"),
         ({"length": 0.001, "width": 0.0001}, r"makes 40000000 scratches; expected at most 2000000"),
     ],

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.drawing.colour import to_8bit
 from pipelines.drawing.stage import Camera, orbit
 from pipelines.geometry.solids import Solid
-from pipelines.glass_scratches.drawing.frames import exposed, object_cameras
+from pipelines.glass_scratches.drawing.frames import object_cameras
 from pipelines.glass_scratches.drawing.stage_view import Lamp, ScratchedActor, draw_scratched
 from pipelines.glass_scratches.tables.fresnel import FresnelFactors
 from pipelines.light.environment_maps import Radiance, check_environment
@@ -69,9 +70,14 @@ class ReferenceView(NamedTuple):
 
 
 def reference_views(
-    solid: Solid, actor: ScratchedActor, light: EnvironmentSampler, size: int
+    solid: Solid,
+    actor: ScratchedActor,
+    light: EnvironmentSampler,
+    exposure: float,
+    size: int,
 ) -> tuple[ReferenceView, ...]:
-    """The object from far and from close, and close with a lamp beside the environment."""
+    """The object from far and from close, and close with a lamp beside the environment;
+    ``exposure`` multiplies radiance."""
     far, close = object_cameras(solid)
     wanted = (("far", far, None), ("close", close, None), ("lamp", close, _LAMP))
     return tuple(
@@ -79,22 +85,23 @@ def reference_views(
             name,
             camera,
             lamp,
-            exposed(
-                draw_scratched(
+            to_8bit(
+                exposure
+                * draw_scratched(
                     actor, light, camera, width=size, height=size, supersampling=2, lamp=lamp
-                )[..., :3],
-                light,
+                )[..., :3]
             ),
         )
         for name, camera, lamp in wanted
     )
 
 
-def poster(actor: ScratchedActor, light: EnvironmentSampler) -> NDArray[np.uint8]:
-    """The object from a little above with a lamp that shines on its scratches, 4:3."""
+def poster(actor: ScratchedActor, light: EnvironmentSampler, exposure: float) -> NDArray[np.uint8]:
+    """The object from a little above with a lamp that shines on its scratches, 4:3; ``exposure``
+    multiplies radiance."""
     height, width = POSTER_SIZE
     camera = orbit((0.0, 0.0, 0.0), _POSTER_DISTANCE, -68.0, 20.0)
     drawn = draw_scratched(
         actor, light, camera, width=width, height=height, supersampling=2, lamp=_LAMP
     )
-    return exposed(drawn[..., :3], light)
+    return to_8bit(drawn[..., :3] * exposure)
