@@ -79,14 +79,20 @@ def _judged(
     )
     exposure = picture_exposure(many.radiance)
     clean = denoised(few)
-    # Paths that met a scratch are to the denoiser as those that met none.
+    # All paths are to the denoiser like those that met no scratch.
     blind = denoised(few._replace(scratched=np.zeros_like(few.scratched), smooth=few.radiance))
     blurred = _blurred_to(few.radiance, many.radiance, clean, exposure)
-    pictures = (many.radiance, clean, blind, few.radiance, blurred)
-    return Judged(*(_codes(each, exposure) for each in pictures), many.scratched)
+    return Judged(
+        reference=_codes(many.radiance, exposure),
+        clean=_codes(clean, exposure),
+        without_scratches=_codes(blind, exposure),
+        noisy=_codes(few.radiance, exposure),
+        blurred=_codes(blurred, exposure),
+        scratched=many.scratched,
+    )
 
 
-def _codes(radiance: NDArray[np.float32], exposure: float) -> Codes:
+def _codes(radiance: NDArray[Any], exposure: float) -> Codes:
     return to_8bit(radiance * exposure).astype(np.float64)
 
 
@@ -95,7 +101,7 @@ def _blurred_to(
     reference: NDArray[np.float32],
     clean: NDArray[np.float32],
     exposure: float,
-) -> NDArray[np.float32]:
+) -> NDArray[Any]:
     """The picture as traced, under the Gaussian that leaves as much noise as the denoiser left
     error: what differs from the reference under the same Gaussian."""
     error = np.std(_codes(clean, exposure) - _codes(reference, exposure))

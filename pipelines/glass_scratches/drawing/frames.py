@@ -22,7 +22,7 @@ from pipelines.light.environment_sampling import EnvironmentSampler, make_enviro
 
 _VIEW_ANGLE, _CLOSE_VIEW_ANGLE = 46.0, 34.0
 """Degrees: wide enough for some of the room to be seen around the object and through it."""
-_AZIMUTH, _ELEVATION = -74.0, 7.0
+_AZIMUTH, _ELEVATION = -80.0, 6.0
 _CLOSE_UP = 0.42
 """Distance of the close view from the surface: a hand's breadth, where the radius is 1."""
 _CLOSE_AZIMUTH, _CLOSE_ELEVATION = -76.0, 2.0
