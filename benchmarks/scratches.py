@@ -45,8 +45,8 @@ RENDER_SIZE, RENDER_SAMPLES = 512, 64
 
 
 def run(scale: str) -> dict[str, Any]:
-    """All figures; docs/scratches.md says what each one means. At the paper's scale those of the
-    pictures are of 180 x 180 pixels, else of 64 x 64."""
+    """All figures; docs/scratches.md says what each one means. The paper's scale is that of
+    `scratches_pictures` alone."""
     figures: dict[str, Any] = {}
     parts = (
         _laws,

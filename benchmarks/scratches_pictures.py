@@ -1,4 +1,9 @@
-"""Figures of the pictures: what the denoiser makes of 64 paths a pixel, beside 4096."""
+"""Figures of the pictures: what the denoiser makes of 64 paths a pixel, beside many.
+
+At the paper's scale pictures have 180 x 180 pixels and references 4096 paths a pixel: the better part
+of an hour. Else they have 64 x 64 and 1024, and the figures' names end in ``_small``: a denoiser
+has less to go by, the fewer pixels a thing has.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +24,17 @@ from pipelines.glass_scratches.scratched_glass import ScratchMaterial, scratched
 from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
 from pipelines.light.room import room
 
-SAMPLES, REFERENCE_SAMPLES = 64, 4096
-SIZES = {"default": 64, "paper": 180}
-CLEAN_SIZE = 512
+SAMPLES = 64
+SIZES = {"default": (64, 1024), "paper": (180, 4096)}
+"""Pixels a side, paths a pixel of the reference."""
+CLEAN_SIZES = {"default": 128, "paper": 512}
 SCRATCHED, UNSCRATCHED = 0.5, 0.1
 """Shares of paths that meet a scratch: a pixel with more than the one shows scratches, with less
 than the other none."""
 _NEIGHBOURS = 11
 """Pixels a side in which unscratched ones tell what would be there without."""
+
+WAYS = ("clean", "without_scratches", "blurred", "noisy")
 
 Codes = NDArray[np.float64]
 
@@ -48,34 +56,40 @@ def picture_figures(material: ScratchMaterial, scale: str) -> dict[str, Any]:
     them the same without scratches among the features, blurred to the same noise, and as traced."""
     light = make_environment_sampler(room(1024))
     solids = {"plate": plate(1.5, 1.1, 0.05), "teapot": glass_teapot(14, 0.05)}
-    judged = {
-        f"{name}_{view}": _judged(solid, material, light, number, SIZES[scale])
-        for name, solid in solids.items()
-        for number, view in enumerate(("far", "close"))
+    far, close = (
+        {name: _judged(solid, material, light, view, scale=scale) for name, solid in solids.items()}
+        for view in range(2)
+    )
+    views = {
+        f"{name}_{view}": one
+        for view, seen in (("far", far), ("close", close))
+        for name, one in seen.items()
     }
-    ways = ("clean", "without_scratches", "blurred", "noisy")
-    psnrs = {way: {key: _psnr(one, way) for key, one in judged.items()} for way in ways}
-    kept = {way: {key: contrast_kept(one, way) for key, one in judged.items()} for way in ways}
-    return {
-        "denoised_psnr_db": min(psnrs["clean"].values()),
-        "denoised_psnr_null_noisy_db": max(psnrs["noisy"].values()),
-        "denoised_psnr_null_blurred_db": max(psnrs["blurred"].values()),
+    psnrs = {way: {name: psnr(one, way) for name, one in views.items()} for way in WAYS}
+    kept = {way: {name: contrast_kept(one, way) for name, one in close.items()} for way in WAYS}
+    figures = {
+        "denoised_psnr_db": min(psnr(one, "clean") for one in far.values()),
+        "denoised_psnr_null_noisy_db": min(psnr(one, "noisy") for one in far.values()),
+        "denoised_psnr_null_blurred_db": min(psnr(one, "blurred") for one in far.values()),
         "scratch_contrast_kept": min(kept["clean"].values()),
         "scratch_contrast_null_no_feature": min(kept["without_scratches"].values()),
         "scratch_contrast_null_blurred": min(kept["blurred"].values()),
-        "denoised_views": {"psnr_db": psnrs, "contrast_kept": kept, "pixels": SIZES[scale]},
-        **_clean_picture(solids, material, light),
+        "denoised_views": {"psnr_db": psnrs, "contrast_kept": kept},
+        **_clean_picture(solids, material, light, CLEAN_SIZES[scale]),
     }
+    end = "" if scale == "paper" else "_small"
+    return {f"{name}{end}": value for name, value in figures.items()}
 
 
 def _judged(
-    solid: Solid, material: ScratchMaterial, light: EnvironmentSampler, view: int, size: int
+    solid: Solid, material: ScratchMaterial, light: EnvironmentSampler, view: int, *, scale: str
 ) -> Judged:
+    size, reference = SIZES[scale]
     glass = scratched_glass(solid, material)
     camera = object_cameras(solid)[view]
     few, many = (
         trace_view(glass, light, camera, size=size, samples=samples, seed=seed)
-        for seed, samples in enumerate((SAMPLES, REFERENCE_SAMPLES))
+        for seed, samples in enumerate((SAMPLES, reference))
     )
     exposure = picture_exposure(many.radiance)
     clean = denoised(few)
@@ -114,7 +128,8 @@ def _blurred_to(
     return cv2.GaussianBlur(noisy, (0, 0), high)
 
 
-def _psnr(one: Judged, way: str) -> float:
+def psnr(one: Judged, way: str) -> float:
+    """Of all of a view's pixels, decibels."""
     error = np.mean((getattr(one, way) - one.reference) ** 2)
     return float(10 * np.log10(255.0**2 / error))
 
@@ -143,7 +158,7 @@ def _standing_out(codes: Codes, scratched: NDArray[np.float32]) -> Codes:
 
 
 def _clean_picture(
-    solids: dict[str, Solid], material: ScratchMaterial, light: EnvironmentSampler
+    solids: dict[str, Solid], material: ScratchMaterial, light: EnvironmentSampler, size: int
 ) -> dict[str, float]:
     """Seconds from a solid to its denoised far view, kernels compiled."""
     figures: dict[str, float] = {}
@@ -151,7 +166,7 @@ def _clean_picture(
         wall, processor = time.perf_counter(), time.process_time()
         glass = scratched_glass(solid, material)
         camera = object_cameras(solid)[0]
-        traced: TracedPicture = trace_view(glass, light, camera, size=CLEAN_SIZE, samples=SAMPLES)
+        traced: TracedPicture = trace_view(glass, light, camera, size=size, samples=SAMPLES)
         denoised(traced)
         figures[f"clean_picture_{name}_s"] = time.perf_counter() - wall
         figures[f"clean_picture_{name}_cpu_s"] = time.process_time() - processor

@@ -18,6 +18,9 @@ from pipelines.light.environment_maps import Radiance, check_environment
 from pipelines.light.environment_sampling import EnvironmentSampler
 
 LARGEST_HALF = float(np.finfo(np.float16).max)
+_LAST = np.uint16(1 << 3)
+"""What the last bit of a half that is kept stands for: 7 bits of its mantissa's 10."""
+_LARGEST_ROUND = np.uint16(0x7BF8)
 POSTER_SIZE = 480, 640
 """Height and width."""
 _POSTER_DISTANCE = 3.2
@@ -28,8 +31,9 @@ _LAMP = Lamp((-0.8, 0.48, 0.36), 3.0)
 def half_radiance(radiance: Radiance, rows: int) -> NDArray[np.float16]:
     """An environment (H, 2 H, 3) in halfs, with at most ``rows`` rows, each a mean over its own.
 
-    Where halfs cannot hold it, which end at 65 504, all of it is scaled down. Raises ValueError for
-    a map that ``check_environment`` refuses.
+    Numbers are rounded to 8 significant bits, 0.4 % of themselves at most: of a room, the last bits
+    that nobody sees make nearly half of a PNG. Where halfs cannot hold it, which end at 65 504, all
+    of it is scaled down. Raises ValueError for a map that ``check_environment`` refuses.
 
     >>> half_radiance(np.full((6, 12, 3), 2.0, np.float32), 4).shape
     (4, 8, 3)
@@ -43,7 +47,9 @@ def half_radiance(radiance: Radiance, rows: int) -> NDArray[np.float16]:
     brightest = float(kept.max())
     if brightest > LARGEST_HALF:
         kept = kept * np.float32(LARGEST_HALF / brightest)
-    return kept.astype(np.float16)
+    bits = kept.astype(np.float16).view(np.uint16)
+    rounded = (bits + np.uint16(_LAST // 2)) // _LAST * _LAST
+    return np.minimum(rounded, _LARGEST_ROUND).view(np.float16)
 
 
 def coverage_codes(coverage: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -29,8 +29,8 @@ SIZE, PATHS = 96, 64
 
 @pytest.fixture(scope="module")
 def scratched_wall() -> tuple[TracedPicture, Floats]:
-    """A wall with an edge behind glass with scratches three pixels wide, as paths would find it, and
-    without noise: of scattered light one path in eight finds eight times as much."""
+    """A wall behind glass with scratches three pixels wide, as paths would find it, and without
+    noise: of scattered light one path in eight finds eight times as much."""
     random = np.random.default_rng(3)
     row, column = np.mgrid[:SIZE, :SIZE]
     off = (2 * row + 3 * column) % 47 - 23
