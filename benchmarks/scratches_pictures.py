@@ -1,8 +1,8 @@
 """Figures of the pictures: what the denoiser makes of 64 paths a pixel, beside many.
 
-At the paper's scale pictures have 180 x 180 pixels and references 4096 paths a pixel: the better part
-of an hour. Else they have 64 x 64 and 1024, and the figures' names end in ``_small``: a denoiser
-has less to go by, the fewer pixels a thing has.
+At the paper's scale pictures have 180 x 180 pixels and references 4096 paths a pixel: the better
+part of an hour. Else they have 64 x 64 and 1024, and the figures' names end in ``_small``: a
+denoiser has less to go by, the fewer pixels a thing has.
 """
 
 from __future__ import annotations
