@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.scratches_pictures import picture_figures
 from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches.drawing.frames import object_cameras
 from pipelines.glass_scratches.drawing.path_tracing import (
@@ -19,6 +20,7 @@ from pipelines.glass_scratches.layers.scratch_layers import make_layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.scratched_glass import (
     ScratchedGlass,
+    ScratchMaterial,
     scratch_material,
     scratched_glass,
 )
@@ -42,8 +44,9 @@ VARIANCE_SIZE, VARIANCE_SAMPLES = 64, 64
 RENDER_SIZE, RENDER_SAMPLES = 512, 64
 
 
-def run() -> dict[str, Any]:
-    """All figures; docs/scratches.md says what each one means."""
+def run(scale: str) -> dict[str, Any]:
+    """All figures; docs/scratches.md says what each one means. The paper's scale is that of
+    `scratches_pictures` alone."""
     figures: dict[str, Any] = {}
     parts = (
         _laws,
@@ -56,6 +59,7 @@ def run() -> dict[str, Any]:
     )
     for part in parts:
         figures |= part()
+    figures |= picture_figures(_material(), scale)
     from tests.reference.groove import reference_figures
 
     return figures | reference_figures()
@@ -137,11 +141,16 @@ def _interpolation() -> dict[str, float]:
     }
 
 
-def _setting_2() -> ScratchedGlass:
-    """The plate with the paper's second setting."""
+def _material() -> ScratchMaterial:
+    """The paper's second setting."""
     table = scratch_brdf_table(_v(), bins=BINS, facets=FACETS[1])
     layers = make_layers(LayerSpec(length=0.6, width=0.01, threshold=0.1), 3)
-    return scratched_glass(plate(1.5, 1.1, 0.05), scratch_material(table, layers))
+    return scratch_material(table, layers)
+
+
+def _setting_2() -> ScratchedGlass:
+    """The plate with it."""
+    return scratched_glass(plate(1.5, 1.1, 0.05), _material())
 
 
 def _sampling() -> dict[str, float]:

@@ -1,4 +1,5 @@
-"""Make docs/pictures/: ``make docs``.
+"""Make docs/pictures/: ``make docs``, or those of some systems:
+``python -m docs.pictures glass_scratches``.
 
 Launches what the pictures show, at the demo's sizes: more partitions than the demo has. Those of
 BTFs are of paper size: `docs.btf_paper_pictures`."""
@@ -6,6 +7,8 @@ BTFs are of paper size: `docs.btf_paper_pictures`."""
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,8 @@ from assets_defs.workspace import Workspace
 from benchmarks.fur_oblique import oblique_pictures
 from docs.fur_pictures import close_and_against_the_light, fur_scene, in_wind
 from pipelines.drawing.colour import to_8bit
+from pipelines.glass_scratches.drawing.frames import picture_exposure
+from pipelines.light.room import room
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.drawing.street_stage import StreetStage
@@ -54,12 +59,11 @@ _HEIGHT = 400
 _GAP = 10
 
 
-def make_pictures(store: VersionedStore) -> None:
-    """Write every picture that the pages show."""
-    _fur(store)
-    _scratches(store)
-    _lighting(store)
-    _street(store)
+def make_pictures(store: VersionedStore, systems: Sequence[System]) -> None:
+    """Write every picture of these systems that the pages show."""
+    made = {FUR: _fur, SCRATCHES: _scratches, SSDF: _lighting, STREET: _street}
+    for system in systems:
+        made[system](store)
 
 
 def _fur(store: VersionedStore) -> None:
@@ -178,6 +182,8 @@ def _scratches(store: VersionedStore) -> None:
         *(shown("scratch_layers", "stages", setting) for setting in ("setting-2", "worn")),
     )
     _row("scratches-frames.png", overview["plate-far"], overview["plate-close"])
+    _row("scratches-denoised.png", *_denoised(store))
+    _row("scratches-room.jpg", _room())
     _row("scratches-teapot.png", overview["teapot-far"], _beside_stage(store))
     _row("scratches-specular.png", overview["plate-diffuse-beside-specular"])
     _moving("scratches-light.webp", overview["plate-moving-light"])
@@ -189,6 +195,19 @@ def _glass(store: VersionedStore, name: str, keys: dict[str, str]) -> NDArray[np
 
 def _furnace(store: VersionedStore) -> NDArray[np.uint8]:
     return _glass(store, "furnace", {"object": "plate", "setting": "setting-2"})
+
+
+def _denoised(store: VersionedStore) -> list[NDArray[np.uint8]]:
+    """Plate and teapot as they were traced, and denoised: far above close."""
+    return [
+        _glass(store, "noise-beside-clean", {"object": name, "setting": "setting-2"})
+        for name in ("plate", "teapot")
+    ]
+
+
+def _room() -> NDArray[np.uint8]:
+    radiance = room(2 * _HEIGHT)
+    return to_8bit(radiance * picture_exposure(radiance))
 
 
 def _beside_stage(store: VersionedStore) -> NDArray[np.uint8]:
@@ -246,19 +265,22 @@ def _row(name: str, *pictures: NDArray[np.uint8]) -> None:
     row.save(FOLDER / name, quality=88, optimize=True)
 
 
-def make_assets() -> None:
-    """Launch what the pictures show; what is current is skipped. Raises SystemExit on failures."""
+def make_assets(systems: Sequence[System]) -> None:
+    """Launch what the pictures of these systems show; what is current is skipped. Raises SystemExit
+    on failures."""
     from tsuya.session import launch_all, open_session, report
 
     with open_session() as session:
         requests = [
             Request(system, system.cross_product(keys), "demo", GIVEN.get(system, {}))
             for system, keys in SHOWN.items()
+            if system in systems
         ]
         launched = launch_all(session, requests)
     report(session, launched, [], as_json=False)
 
 
 if __name__ == "__main__":
-    make_assets()
-    make_pictures(Workspace.of_checkout().store)
+    chosen = [system for system in SHOWN if not sys.argv[1:] or system.name in sys.argv[1:]]
+    make_assets(chosen)
+    make_pictures(Workspace.of_checkout().store, chosen)

@@ -169,12 +169,13 @@ def material_of(
     )
 
 
-def frames_dataset(frames: GlassFrames) -> xr.Dataset:
-    """`glass_frames` of both views, the moving light and the furnace."""
+def frames_dataset(frames: GlassFrames, environment: NDArray[np.floating]) -> xr.Dataset:
+    """`glass_frames` of both views, the moving light and the furnace, in an environment."""
     import numpy as np
     import xarray as xr
 
     from pipelines.drawing.colour import to_8bit
+    from pipelines.light.environment_maps import mean_radiance
 
     traced = (frames.far, frames.close)
     radiance = np.stack([picture.radiance for picture in traced])
@@ -182,12 +183,14 @@ def frames_dataset(frames: GlassFrames) -> xr.Dataset:
     return xr.Dataset(
         {
             "radiance": ((*pixels, "channel"), radiance),
+            "clean": ((*pixels, "channel"), frames.clean),
             "error": (pixels, np.sqrt(np.stack([picture.variance for picture in traced]))),
             "scratched": (pixels, np.stack([picture.scratched for picture in traced])),
-            "frames": ((*pixels, "channel"), to_8bit(radiance * frames.exposure)),
+            "frames": ((*pixels, "channel"), to_8bit(frames.clean * frames.exposure)),
             "stage": ((*pixels, "channel"), to_8bit(frames.stage * frames.exposure)),
             "moving": (("light", "row", "column", "channel"), frames.moving),
             "exposure": ((), frames.exposure),
+            "surroundings": ("channel", mean_radiance(environment)),
             "furnace": (furnace_pixels, frames.furnace.radiance.mean(axis=2)),
             "furnace_error": (furnace_pixels, np.sqrt(frames.furnace.variance)),
         }

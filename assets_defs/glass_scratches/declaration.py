@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SETTINGS = ("setting-1", "setting-2", "mirror", "worn")
 """Table 1's two; the second with mirror-like walls; and scratches as years leave them."""
 OBJECTS = ("plate", "teapot")
-ENVIRONMENTS = ("lamps", "sky", "uniform")
+ENVIRONMENTS = ("room", "lamps", "sky", "uniform")
 
 
 def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:

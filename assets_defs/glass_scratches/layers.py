@@ -54,13 +54,13 @@ class LayerSettings(Settings):
             "worn": {
                 "length": 0.5,
                 "width": 0.005,
-                "coverage": 0.01,
+                "coverage": 0.012,
                 "layers": 6,
                 "curvature": 0.5,
-                "digs": 0.15,
+                "digs": 0.08,
                 "fading": 0.7,
                 "breaks": 0.3,
-                "spread": 0.5,
+                "spread": 0.8,
             },
         }
         sizes = {"test": {"resolution": 128}, "paper": {"resolution": 2048}}

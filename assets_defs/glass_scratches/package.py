@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from pipelines.glass_scratches.scratched_glass import ScratchMaterial
     from storage.packages import Contents, Figure, View
 
-_OTHERS = ("lamps", "sky")
+_OTHERS = ("room", "lamps", "sky")
 """Environments that each package has beside its own."""
 _OWN = "own"
 """What a user's environment is called in the package."""
@@ -115,7 +114,7 @@ def glass_package(
     from storage.packages import write_package
     from storage.packages.glass_scratches import PACKAGE
 
-    light = light_of(settings, lineage, float(glass_frames["exposure"]))
+    light = light_of(settings, lineage, glass_frames)
     glass = _Glass(
         solid_of(glass_object), material_of(scratch_table_2d, scratch_table, scratch_layers), light
     )
@@ -139,23 +138,27 @@ class _Light(NamedTuple):
     source: str
     """The first one's name, or its file's."""
     tile: float
+    exposure: float
 
 
 def light_of(
-    settings: GlassPackageSettings, lineage: Sequence[Mapping[str, Any]], exposure: float
+    settings: GlassPackageSettings,
+    lineage: Sequence[Mapping[str, Any]],
+    glass_frames: xr.Dataset,
 ) -> _Light:
     """The frames' environment, made or read again, and the built-in ones.
 
     Raises ValueError where a user's file is not what it was, BadInput where it is gone.
     """
-    from pipelines.glass_scratches.drawing.frames import environment_exposure
+    import numpy as np
+
     from pipelines.glass_scratches.drawing.live_parts import half_radiance
-    from pipelines.light.environment_sampling import make_environment_sampler
+    from pipelines.light.environment_maps import mean_radiance
 
     chosen = next(step["settings"] for step in lineage if step["asset"] == "glass_frames")
     shown = FrameSettings(**chosen)
     radiance = environment(shown).radiance
-    if not math.isclose(environment_exposure(make_environment_sampler(radiance)), exposure):
+    if not np.allclose(mean_radiance(radiance), glass_frames["surroundings"].values):
         raise ValueError(
             f"{shown.environment} has changed since glass_frames was made; "
             "expected the same file: run glass_frames again."
@@ -163,7 +166,7 @@ def light_of(
     built_in = shown.environment in ENVIRONMENTS
     name = shown.environment if built_in else _OWN
     others = {
-        other: environment(FrameSettings(environment=other)).radiance
+        other: environment(FrameSettings(environment=other, light_rows=shown.light_rows)).radiance
         for other in _OTHERS
         if other != name
     }
@@ -171,7 +174,8 @@ def light_of(
         key: half_radiance(each, settings.environment_rows)
         for key, each in {name: radiance, **others}.items()
     }
-    return _Light(halfs, name if built_in else Path(shown.environment).name, shown.tile)
+    source = name if built_in else Path(shown.environment).name
+    return _Light(halfs, source, shown.tile, float(glass_frames["exposure"]))
 
 
 # ---- what is packed --------------------------------------------------------------------------
@@ -218,13 +222,14 @@ class _Glass:
         """The reference views, drawn."""
         from pipelines.glass_scratches.drawing.live_parts import reference_views
 
-        return reference_views(self.solid, self._actor(), self.samplers[self.name], size)
+        light = self.samplers[self.name]
+        return reference_views(self.solid, self._actor(), light, self.light.exposure, size)
 
     def poster(self) -> NDArray[np.uint8]:
         """The glass under a lamp."""
         from pipelines.glass_scratches.drawing.live_parts import poster
 
-        return poster(self._actor(), self.samplers[self.name])
+        return poster(self._actor(), self.samplers[self.name], self.light.exposure)
 
     def _actor(self) -> ScratchedActor:
         from pipelines.glass_scratches.drawing.stage_view import ScratchedActor
@@ -241,14 +246,14 @@ class _Glass:
 
     def parameters(self) -> dict[str, Any]:
         """Values by the names of parameters."""
-        from pipelines.glass_scratches.drawing import frames, stage_view
+        from pipelines.glass_scratches.drawing import stage_view
 
         return {
             "refractive_index": self.material.refractive_index,
             "roughness": self.material.roughness,
             "tile": self.light.tile,
             "environment": self.name,
-            "exposure": frames.environment_exposure(self.samplers[self.name]),
+            "exposure": self.light.exposure,
             "lamp_edge": list(stage_view.LAMP_EDGE),
             "lamp_colour": list(stage_view.LAMP_COLOUR),
         }

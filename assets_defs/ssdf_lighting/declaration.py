@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SCENES = ("teapot", "court")
-ENVIRONMENTS = ("sky", "lamps")
+ENVIRONMENTS = ("sky", "lamps", "room")
 
 
 def _check_scene(source: Source, settings: Mapping[str, Any]) -> None:
@@ -66,7 +66,7 @@ SSDF = System(
         Dimension(
             "environment",
             builtin=(*ENVIRONMENTS, "uniform"),
-            examples=ENVIRONMENTS,
+            examples=("sky", "lamps"),
             default="sky",
             suffixes=(".hdr", ".exr"),
             check=_check_environment,

@@ -140,11 +140,14 @@ def environment_lights(settings: LightSettings, source: Source, progress: Progre
 def _light(settings: LightSettings, source: Source) -> EnvironmentFile:
     """The environment. Raises BadInput for a file that holds none."""
     from pipelines.light.built_in_environments import lamps, sky, uniform
+    from pipelines.light.room import room
     from storage.readers.environments import EnvironmentFile, read_environment
 
     if source.path is not None:
         return read_environment(source.path)
-    if source.key == "sky":
+    if source.key == "room":
+        made = room(_HEIGHT)
+    elif source.key == "sky":
         made = sky(_HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation)
     else:
         made = lamps(_HEIGHT) if source.key == "lamps" else uniform(8)

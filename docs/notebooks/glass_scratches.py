@@ -7,12 +7,13 @@
 # %%
 import matplotlib.pyplot as plt
 
+from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches import scratched_glass as glass
-from pipelines.glass_scratches.drawing import frames
+from pipelines.glass_scratches.drawing import denoising, frames
 from pipelines.glass_scratches.layers import scratch_layers, settings
 from pipelines.glass_scratches.tables import profiles, scratch_table
-from pipelines.light import built_in_environments, environment_sampling
+from pipelines.light import environment_sampling, room
 
 # %% [markdown]
 # A V with diffuse walls, 10 µm wide and 4 deep; four layers of such scratches; a plate with them.
@@ -23,10 +24,11 @@ layers = scratch_layers.make_layers(settings.LayerSpec(length=0.6, width=0.01), 
 pane = glass.scratched_glass(plate(1.5, 1.1, 0.05), glass.scratch_material(table, layers))
 
 # %% [markdown]
-# A hand's breadth from the plate, among lamps: 16 paths of light a pixel.
+# A hand's breadth from the plate, in a room: 16 paths of light a pixel, and their noise taken away.
 
 # %%
-lamps = environment_sampling.make_environment_sampler(built_in_environments.lamps(256))
-traced = frames.trace_view(pane, lamps, frames.object_cameras(pane.solid)[1], size=180, samples=16)
-plt.imshow(frames.exposed(traced.radiance, lamps))
+light = environment_sampling.make_environment_sampler(room.room(512))
+traced = frames.trace_view(pane, light, frames.object_cameras(pane.solid)[1], size=180, samples=16)
+clean = denoising.denoised(traced)
+plt.imshow(to_8bit(clean * frames.picture_exposure(clean)))
 plt.show()

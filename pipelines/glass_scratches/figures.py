@@ -214,6 +214,17 @@ def enclosed_volume(vertices: NDArray[np.float64], triangles: NDArray[np.integer
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
+def denoised_change(clean: NDArray[np.floating], traced: NDArray[np.floating]) -> float:
+    """Largest relative change of the mean radiance of views (V, H, W, 3) by a denoiser.
+
+    >>> traced = np.ones((2, 4, 4, 3), np.float32)
+    >>> round(denoised_change(traced * np.float32(0.75), traced), 6)
+    0.25
+    """
+    before, after = (each.mean(axis=(1, 2, 3), dtype=np.float64) for each in (traced, clean))
+    return float(np.abs(after / before - 1).max())
+
+
 def impossible_share(radiance: NDArray[np.floating]) -> float:
     """Share of the radiance that is not finite, or negative."""
     return float(np.mean(~np.isfinite(radiance) | (radiance < 0)))

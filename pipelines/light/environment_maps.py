@@ -72,6 +72,17 @@ def solid_angles(height: int) -> FloatArray:
     return heights * (math.pi / height)
 
 
+def mean_radiance(radiance: NDArray[np.floating]) -> FloatArray:
+    """Mean over all directions (3,) of a map (H, 2 H, 3).
+
+    >>> mean_radiance(np.full((4, 8, 3), 2.0, np.float32)).round(12).tolist()
+    [2.0, 2.0, 2.0]
+    """
+    rows = radiance.mean(axis=1, dtype=np.float64)
+    share = solid_angles(len(radiance)) * radiance.shape[1] / (4.0 * math.pi)
+    return np.asarray(share @ rows)
+
+
 def check_height(height: int) -> None:
     """Raise ValueError unless a map may have that many rows."""
     if height < 1:

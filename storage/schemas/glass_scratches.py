@@ -127,12 +127,16 @@ GLASS_OBJECT = Schema(
 GLASS_FRAMES = Schema(
     _SYSTEM,
     "glass_frames",
-    1,
+    2,
     "Pictures of the scratched object: traced, and the same views on the stage.",
     {
         "radiance": Variable(
-            ("view", *_PIXELS, "channel"), "float32", "1", "Linear RGB of the far and close view"
+            ("view", *_PIXELS, "channel"),
+            "float32",
+            "1",
+            "Linear RGB of the far and close view, as traced",
         ),
+        "clean": Variable(("view", *_PIXELS, "channel"), "float32", "1", "The same, denoised"),
         "error": Variable(
             ("view", *_PIXELS), "float32", "1", "Standard error of the radiance's mean over RGB"
         ),
@@ -143,7 +147,7 @@ GLASS_FRAMES = Schema(
             ("view", *_PIXELS, "channel"),
             "uint8",
             "1",
-            "sRGB pictures, traced, far and close",
+            "sRGB pictures, traced and denoised, far and close",
             "figures 6-8",
         ),
         "stage": Variable(
@@ -155,7 +159,15 @@ GLASS_FRAMES = Schema(
             "1",
             "The close view while the light goes around, by the shader",
         ),
-        "exposure": Variable((), "float64", "1", "Factor on the radiance before sRGB"),
+        "exposure": Variable(
+            (),
+            "float64",
+            "1",
+            "Factor on the radiance before sRGB: both views' geometric mean becomes 0.22",
+        ),
+        "surroundings": Variable(
+            ("channel",), "float64", "1", "Mean radiance of the environment, all around"
+        ),
         "furnace": Variable(
             ("furnace_row", "furnace_column"),
             "float32",

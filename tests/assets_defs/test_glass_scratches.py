@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from assets_defs.glass_scratches.graph import SCRATCHES
+from assets_defs.glass_scratches.layers import LayerSettings, layer_spec
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from pipelines.drawing import colour
@@ -96,6 +97,30 @@ def test_the_overview_lays_settings_side_by_side(good: Any) -> None:
     }
     assert pictures["plate-far"].shape == (32, 64, 3)
     good.launcher.launch(Request(SCRATCHES, [KEYS], "test"))
+
+
+def test_the_papers_settings_are_the_papers_and_worn_glass_varies(good: Any) -> None:
+    """Table 1 to the letter, every scratch like the next; and as years leave them: the widest of
+    twenty is many times as wide as the narrowest, the weakest a fraction as strong."""
+    for name, length, width in (("setting-1", 0.3, 0.001), ("setting-2", 0.6, 0.01)):
+        spec = layer_spec(LayerSettings.preset("demo", {"setting": name}))
+        assert (spec.length, spec.width, spec.threshold) == (length, width, 0.1)
+        assert (spec.coverage, spec.spread, spec.fading, spec.breaks, spec.digs) == (
+            None,
+            0,
+            0,
+            0,
+            0,
+        )
+        if name == "setting-2":
+            same = scratch_layers.make_layers(spec, 3).features
+            assert np.ptp(same.half_width) == np.ptp(same.half_length) == 0
+            assert (same.strength == 1).all()
+    worn = layer_spec(LayerSettings.preset("demo", {"setting": "worn"}))
+    made = scratch_layers.make_layers(worn, 3).features
+    for sizes, times in ((made.half_width, 8), (made.half_length, 5), (made.strength, 4)):
+        low, high = np.quantile(sizes[~made.is_dig], [0.05, 0.95])
+        assert high > times * low
 
 
 # ---- users' files ----------------------------------------------------------------------------
@@ -207,6 +232,12 @@ def _unscratched(right: Callable[..., Any], *arguments: Any, **options: Any) -> 
     return picture._replace(scratched=picture.scratched * 0)
 
 
+def _close_view_lost(right: Callable[..., Any], picture: Any) -> Any:
+    """Scratches fill more of the close view than of the far one."""
+    clean = right(picture)
+    return clean * np.float32(0.01) if picture.normal.any(axis=2).all() else clean
+
+
 def _furnace_times(factor: float) -> Callable[..., Any]:
     def wrong(right: Callable[..., Any], *arguments: Any) -> Any:
         picture = right(*arguments)
@@ -250,6 +281,14 @@ REGRESSIONS = (
         colour,
         "to_8bit",
         lambda right, picture: right(np.asarray(picture) * 0.5),
+        KEYS,
+    ),
+    Regression("darker_view", frames, "denoised", _close_view_lost, KEYS),
+    Regression(
+        "denoised_change",
+        frames,
+        "denoised",
+        lambda right, picture: right(picture) * np.float32(0.7),
         KEYS,
     ),
     Regression(
@@ -299,7 +338,7 @@ def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
         ({"roughness": 0.5, "method": "exact"}, r"roughness is 0\.5 with the method exact"),
         ({"resolution": 100}, r"resolution is 100; expected a power of two"),
         ({"shape": "u", "profile_depth": 8.0}, r"depth of the profile is 8; expected at most 5"),
-        ({"environment": "moon"}, r"environment is 'moon'; expected lamps, sky, uniform"),
+        ({"environment": "moon"}, r"environment is 'moon'; expected room, lamps, sky, uniform"),
         ({"environment": "gone.hdr"}, r"gone\.hdr: .* missing"),
         ({"length": 0.001, "width": 0.0001}, r"makes 40000000 scratches; expected at most 2000000"),
     ],

@@ -24,7 +24,7 @@ CHANGES: dict[str, Any] = {
     "tilt": -25,
     "swing": -40,
     "turn": -60,
-    "brightness": 1,
+    "brightness": 0.4,
     "coverage": 3,
     "strength": 0.25,
     "tile": 0.5,
@@ -104,11 +104,11 @@ def test_an_environment_of_ones_own(
 ) -> None:
     """The same light in a file is the same picture; other light is another."""
     opened = read_package(package)
-    lamps = opened.picture("environment_lamps").view(np.float16).astype(np.float32)
+    room = opened.picture("environment_room").view(np.float16).astype(np.float32)
     viewer = open_viewer(package).ready()
     before = viewer.capture(*SMALL)
     drop = "input[name=file]"
-    viewer.page.set_input_files(drop, str(_hdr(tmp_path / "same.hdr", 7 * lamps)))
+    viewer.page.set_input_files(drop, str(_hdr(tmp_path / "same.hdr", 7 * room)))
     viewer.wait_for("() => window.tsuya.view().state.environment === 'yours'")
     assert mean_difference(viewer.capture(*SMALL), before) < 1.0  # RGBE has 8 bits of each number
     blue = np.zeros((32, 64, 3), np.uint8)

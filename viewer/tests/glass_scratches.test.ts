@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { Environment, lampRadiance, lampSteradians } from "../src/systems/glass_scratches/environment";
 import { environmentOf } from "../src/systems/glass_scratches/environment_file";
-import { drawnLights, LIGHTS, luminance, meanLuminance } from "../src/systems/glass_scratches/lights";
+import { drawnLights, LIGHTS, luminance, meanLuminance, typicalLuminance } from "../src/systems/glass_scratches/lights";
 import { controlsOf, stateOf, withState, type Settings } from "../src/systems/glass_scratches/state";
 import fixture from "./glass_scratches_lights.json";
 
@@ -16,19 +16,37 @@ describe("lights of an environment", () => {
   });
 
   it("carry what comes from all around", () => {
-    const environment = new Environment(map);
-    expect(environment.exposure).toBeCloseTo(fixture.exposure, 5);
-    expect(environment.through).toBeCloseTo(fixture.through * fixture.exposure, 5);
-    expect(meanLuminance(map) * environment.exposure).toBeCloseTo(0.35, 9);
+    const environment = new Environment(map, 2.5);
+    expect(environment.through).toBeCloseTo(fixture.through * 2.5, 5);
+    expect(environment.mean).toBeCloseTo(meanLuminance(map) * 2.5, 9);
   });
 
   it("are joined by a lamp of the light that it is asked for", () => {
     const { edge, colour } = fixture.lamp;
-    const radiance = lampRadiance(3, edge, colour);
-    expect(luminance(radiance) * lampSteradians(edge)).toBeCloseTo(3 * Math.PI * 0.35, 9);
-    radiance.forEach((value, n) => {
-      expect(value / (fixture.lamp.radiance[n] * fixture.exposure)).toBeCloseTo(1, 5);
-    });
+    const radiance = lampRadiance(3, meanLuminance(map), edge, colour);
+    expect(luminance(radiance) * lampSteradians(edge)).toBeCloseTo(3 * Math.PI * meanLuminance(map), 9);
+    radiance.forEach((value, n) => expect(value / fixture.lamp.radiance[n]).toBeCloseTo(1, 5));
+  });
+});
+
+describe("what is typical of an environment", () => {
+  const grey = (of: (texel: number) => number) => ({
+    height: 16,
+    data: Float32Array.from({ length: 3 * 16 * 32 }, (_, n) => of(Math.floor(n / 3))),
+  });
+
+  it("is its radiance where that is even", () => {
+    expect(typicalLuminance(grey(() => 0.25))).toBeCloseTo(0.25, 6);
+  });
+
+  it("is not its lamp's, which is most of the mean", () => {
+    const lit = grey((texel) => (texel === 200 ? 900 : 0.25));
+    expect(meanLuminance(lit)).toBeGreaterThan(1.5);
+    expect(typicalLuminance(lit)).toBeLessThan(0.27);
+  });
+
+  it("is more than nothing among black", () => {
+    expect(typicalLuminance(grey((texel) => (texel === 200 ? 900 : 0)))).toBeGreaterThan(1e-4);
   });
 });
 

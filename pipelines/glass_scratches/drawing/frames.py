@@ -12,31 +12,38 @@ from pipelines.drawing.colour import luminance, to_8bit
 from pipelines.drawing.stage import Camera, fitting_distance, orbit
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.solids import Solid
+from pipelines.glass_scratches.drawing.denoising import denoised
 from pipelines.glass_scratches.drawing.path_tracing import TracedPicture, trace_picture
 from pipelines.glass_scratches.drawing.stage_view import draw_scratched
 from pipelines.glass_scratches.scratched_glass import ScratchedGlass
 from pipelines.light.built_in_environments import uniform
-from pipelines.light.environment_maps import rotate_environment, solid_angles
+from pipelines.light.environment_maps import rotate_environment
 from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
 
-_VIEW_ANGLE = 30.0
-_AZIMUTH, _ELEVATION = -68.0, 14.0
+_VIEW_ANGLE, _CLOSE_VIEW_ANGLE = 46.0, 34.0
+"""Degrees: wide enough for some of the room to be seen around the object and through it."""
+_AZIMUTH, _ELEVATION = -80.0, 6.0
 _CLOSE_UP = 0.42
 """Distance of the close view from the surface: a hand's breadth, where the radius is 1."""
-_CLOSE_AZIMUTH, _CLOSE_ELEVATION = -82.0, 8.0
+_CLOSE_AZIMUTH, _CLOSE_ELEVATION = -76.0, 2.0
 FURNACE_SIZE, FURNACE_SAMPLES = 48, 64
+_KEY = 0.22
+"""What the picture's middle brightness is shown as: a little over a photographer's grey card."""
+_DARKEST = 1e-3
 
 
 class GlassFrames(NamedTuple):
     """What scratched glass looks like.
 
-    far, close: as traced. stage: (2, H, W, 3) float32 radiance, the same views on the stage.
+    far, close: as traced. clean: (2, H, W, 3) float32 radiance, the same without noise.
+    stage: (2, H, W, 3) float32 radiance, the same views on the stage.
     moving: (lights, S, S, 3) uint8, the close view while the light turns once around.
     furnace: the far view in an environment of radiance 1. exposure: factor for display.
     """
 
     far: TracedPicture
     close: TracedPicture
+    clean: NDArray[np.float32]
     stage: NDArray[np.float32]
     moving: NDArray[np.uint8]
     furnace: TracedPicture
@@ -54,8 +61,9 @@ def draw_frames(
     seed: int,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> GlassFrames:
-    """Trace both views (size x size pixels, ``samples`` paths each), draw the same on the stage,
-    let the light go around in ``lights`` pictures, and trace the furnace."""
+    """Trace both views (size x size pixels, ``samples`` paths each) and take their noise away, draw
+    the same on the stage, let the light go around in ``lights`` pictures, and trace the furnace.
+    """
     (far, close), stage = trace_views(
         glass,
         light,
@@ -64,21 +72,24 @@ def draw_frames(
         seed=seed,
         progress=lambda fraction: progress(0.8 * fraction),
     )
+    clean = np.stack([denoised(far), denoised(close)])
+    exposure = picture_exposure(clean)
     moving = draw_moving_light(
         glass,
         light,
+        exposure,
         count=lights,
         size=moving_size,
         progress=lambda fraction: progress(0.8 + 0.15 * fraction),
     )
     white = trace_furnace(glass, seed)
-    return GlassFrames(far, close, stage, moving, white, environment_exposure(light))
+    return GlassFrames(far, close, clean, stage, moving, white, exposure)
 
 
 def object_cameras(solid: Solid) -> tuple[Camera, Camera]:
     """The whole object, and its surface from a hand's breadth."""
     middle = (0.0, 0.0, 0.0)
-    distance = 1.03 * fitting_distance(
+    distance = 1.12 * fitting_distance(
         solid.vertices, middle, _AZIMUTH, _ELEVATION, view_angle=_VIEW_ANGLE, aspect=1.0
     )
     far = orbit(middle, distance, _AZIMUTH, _ELEVATION, view_angle=_VIEW_ANGLE)
@@ -89,21 +100,27 @@ def object_cameras(solid: Solid) -> tuple[Camera, Camera]:
     if not np.isfinite(hit):  # a ring: its hole lies in the middle
         hit = np.float32(np.linalg.norm(start))
     x, y, z = (np.array(start) + float(hit) * way).tolist()
-    close = orbit((x, y, z), _CLOSE_UP, _CLOSE_AZIMUTH, _CLOSE_ELEVATION, view_angle=_VIEW_ANGLE)
+    close = orbit(
+        (x, y, z), _CLOSE_UP, _CLOSE_AZIMUTH, _CLOSE_ELEVATION, view_angle=_CLOSE_VIEW_ANGLE
+    )
     return far, close
 
 
-def environment_exposure(light: EnvironmentSampler) -> float:
-    """Factor that shows a white matt surface, lit evenly by all of the environment, as 0.35: equal
-    for all scratches in the same light."""
-    bright = luminance(light.radiance.astype(np.float64))
-    solid = solid_angles(len(bright))[:, None]
-    return 0.35 * 4 * np.pi / float(np.sum(bright * solid))
+def picture_exposure(radiance: NDArray[np.floating]) -> float:
+    """Factor that shows the geometric mean of pictures' luminance, (..., 3), as 0.22.
 
+    What is small and bright, lamps or the sun, hardly moves it; the mean of an environment with a
+    sun is mostly the sun's. What is darker than a thousandth of the mean counts as that.
 
-def exposed(radiance: NDArray[np.floating], light: EnvironmentSampler) -> NDArray[np.uint8]:
-    """Radiance (..., 3) in an environment as it is displayed, 8 bits sRGB."""
-    return to_8bit(radiance * environment_exposure(light))
+    >>> picture = np.full((8, 8, 3), 0.11, np.float32)
+    >>> round(picture_exposure(picture), 6)
+    2.0
+    >>> picture[0, 0] = 1e4
+    >>> 1.0 < picture_exposure(picture) < 2.0
+    True
+    """
+    bright = luminance(radiance.astype(np.float64))
+    return _KEY / float(np.exp(np.log(np.maximum(bright, _DARKEST * bright.mean() + 1e-30)).mean()))
 
 
 def trace_view(
@@ -169,6 +186,7 @@ def trace_furnace(glass: ScratchedGlass, seed: int) -> TracedPicture:
 def draw_moving_light(
     glass: ScratchedGlass,
     light: EnvironmentSampler,
+    exposure: float,
     *,
     count: int,
     size: int,
@@ -186,4 +204,4 @@ def draw_moving_light(
             glass.actor, turned, camera, width=size, height=size, supersampling=2
         )
         pictures.append(drawn[..., :3])
-    return exposed(np.stack(pictures), light)
+    return to_8bit(np.stack(pictures) * exposure)

@@ -27,7 +27,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.geometry.rays import build_scene, first_hits, occluded
+from pipelines.geometry.rays import FirstHits, build_scene, first_hits, occluded
 from pipelines.glass_scratches.drawing.path_events import DEEPEST, advance_paths
 from pipelines.glass_scratches.drawing.path_numbers import jitter_pixels
 from pipelines.glass_scratches.drawing.path_state import (
@@ -56,12 +56,19 @@ _MOST_FLATS = 4
 
 
 class TracedPicture(NamedTuple):
-    """``radiance`` (H, W, 3) float32 linear; ``variance`` (H, W) float32 of its mean over the
-    channels; ``scratched`` (H, W) float32: share of the paths that met a scratch; ``rays``."""
+    """A picture, and what a denoiser wants to know of it.
+
+    ``radiance`` (H, W, 3) float32 linear; ``variance`` (H, W) float32 of its mean over the
+    channels; ``scratched`` (H, W) float32: share of the paths that met a scratch; ``smooth``
+    (H, W, 3) float32: the part of the radiance that came by paths that met none; ``normal``
+    (H, W, 3) float32: mean of the unit normals that are seen first, 0 beside the object; ``rays``.
+    """
 
     radiance: NDArray[np.float32]
     variance: NDArray[np.float32]
     scratched: NDArray[np.float32]
+    smooth: NDArray[np.float32]
+    normal: NDArray[np.float32]
     rays: int
 
 
@@ -107,21 +114,29 @@ def trace_picture(
     radiance = np.empty((total, 3), np.float32)
     variance = np.empty(total, np.float32)
     scratched = np.empty(total, np.float32)
+    smooth, normal = np.empty((total, 3), np.float32), np.empty((total, 3), np.float32)
     rays = 0
     for first in range(0, total, pixels_a_block):
         progress(first / total)
         pixels = np.arange(first, min(first + pixels_a_block, total))
         paths = _start(view, pixels, width, samples, seed)
-        gathered, met, cast = _trace_block(scene, glass, paths)
+        gathered, met, facing, cast = _trace_block(scene, glass, paths)
         rays += cast
         parts = gathered.reshape(len(pixels), samples, 3)
+        smooth[pixels] = np.where(met[:, None], 0.0, gathered).reshape(parts.shape).mean(axis=1)
+        normal[pixels] = facing.reshape(parts.shape).mean(axis=1)
         radiance[pixels] = parts.mean(axis=1)
         variance[pixels] = parts.mean(axis=2).var(axis=1) / max(samples - 1, 1)
         scratched[pixels] = met.reshape(len(pixels), samples).mean(axis=1)
     progress(1.0)
     grid = (height, width)
     return TracedPicture(
-        radiance.reshape(*grid, 3), variance.reshape(grid), scratched.reshape(grid), rays
+        radiance.reshape(*grid, 3),
+        variance.reshape(grid),
+        scratched.reshape(grid),
+        smooth.reshape(*grid, 3),
+        normal.reshape(*grid, 3),
+        rays,
     )
 
 
@@ -210,13 +225,17 @@ def _start(view: _View, pixels: NDArray[np.int64], width: int, samples: int, see
 
 def _trace_block(
     scene: RaycastingScene, glass: TracedGlass, paths: Paths
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-    """Radiance (N, 3) of paths, whether they met a scratch (N,), and the rays that it took."""
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float32], int]:
+    """Radiance (N, 3) of paths, whether they met a scratch (N,), the normals (N, 3) that they met
+    first, and the rays that it took."""
     count = len(paths.number)
     radiance, met_scratch = np.zeros((count, 3)), np.zeros(count, np.bool_)
+    normals = np.zeros((count, 3), np.float32)
     rays = 0
     for depth in range(DEEPEST):
         hits = first_hits(scene, paths.origin, paths.direction)
+        if depth == 0:
+            normals = _met_normals(glass.faces, hits)
         left = len(paths.number)
         rays += left
         alive = np.zeros(left, np.bool_)
@@ -233,7 +252,17 @@ def _trace_block(
         if not alive.any():
             break
         paths = Paths._make(array[alive] for array in paths)
-    return radiance, met_scratch, rays
+    return radiance, met_scratch, normals, rays
+
+
+def _met_normals(faces: Faces, hits: FirstHits) -> NDArray[np.float32]:
+    """Interpolated unit normals (N, 3) where rays meet the surface; 0 where they do not."""
+    met = hits.triangle >= 0
+    normals = np.zeros((len(met), 3), np.float32)
+    corners = faces.corner_normals[hits.triangle[met]]
+    mixed = np.einsum("ij,ijk->ik", hits.barycentric[met], corners)
+    normals[met] = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+    return normals
 
 
 def _in_threads(count: int, *arguments: Any) -> None:

@@ -109,6 +109,80 @@ def test_walls_are_as_thick_as_asked(thickness: float) -> None:
         assert (np.einsum("ni,ni->n", face_normals(solid)[inner.triangle], inwards) > 0.9).all()
 
 
+@pytest.mark.parametrize("thickness", [0.02, 0.05, 0.08])
+def test_the_bodys_wall_is_even(thickness: float) -> None:
+    """Along the normals where lines from the side meet the body: half of the walls differ from what
+    was asked for by less than 2 %, nine in ten by less than 6 %."""
+    solid = glass_teapot(14, thickness)
+    azimuth = np.radians(np.concatenate([np.arange(35, 146), np.arange(215, 326)]))
+    azimuth, height = (each.ravel() for each in np.meshgrid(azimuth, np.linspace(-0.36, 0.2, 23)))
+    across = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
+    start = np.array([-TEAPOT_CENTRE[0], 0, 0]) + across * 2
+    start[:, 2] += height
+    outer = cast(solid, start, -across)
+    inwards = -face_normals(solid)[outer.triangle]
+    surface = start - across * outer.distance[:, None]
+    wall = cast(solid, surface + 1e-4 * inwards, inwards).distance + 1e-4
+    off = np.abs(wall / thickness - 1)
+    assert np.median(off) < 0.02
+    assert np.quantile(off, 0.9) < 0.06
+
+
+def test_lengths_inside_make_up_the_volume() -> None:
+    """Parallel lines, evenly apart, against the divergence theorem; a filled pot has far more."""
+    solid = glass_teapot(10, 0.05)
+    places = (np.arange(400) + 0.5) / 200 - 1
+    y, z = (each.ravel() for each in np.meshgrid(places, places))
+    here = np.stack([np.full(len(y), -2.0), y, z], axis=-1)
+    alive, inside = np.arange(len(y)), np.zeros(len(y), bool)
+    glass, first, last = np.zeros(len(y)), np.full(len(y), np.nan), np.full(len(y), np.nan)
+    while len(alive):
+        hit = cast(solid, here[alive], np.array([1.0, 0.0, 0.0]))
+        met = np.isfinite(hit.distance)
+        alive, far = alive[met], hit.distance[met] + 1e-6
+        glass[alive] += np.where(inside[alive], far, 0.0)
+        here[alive, 0] += far
+        inside[alive] = face_normals(solid)[hit.triangle[met], 0] < 0
+        first[alive] = np.where(np.isnan(first[alive]), here[alive, 0], first[alive])
+        last[alive] = here[alive, 0]
+    cell = (2.0 / 400) ** 2
+    enclosed = volume(solid.vertices, solid.triangles)
+    assert glass.sum() * cell == pytest.approx(enclosed, rel=0.01)
+    assert np.nansum(last - first) * cell > 3 * enclosed
+
+
+def test_one_sees_straight_through_the_hollow_body() -> None:
+    """By Snell's law at four surfaces, against a filled body's two: walls hardly turn light."""
+    solid = glass_teapot(14, 0.05)
+    azimuth = np.radians(np.repeat(np.arange(60, 121, 3), 9))
+    height = np.tile(np.linspace(-0.25, 0.1, 9), 21)
+    came = -np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1)
+    start = np.array([-TEAPOT_CENTRE[0] + 0.1, 0, 0]) - 2 * came  # beside the axis
+    start[:, 2] += height
+
+    def turned(surfaces: int, skipped: tuple[int, ...]) -> Array:
+        here, way = start, came
+        for number in range(surfaces):
+            hit = cast(solid, here, way)
+            here = here + (hit.distance[:, None] + 1e-5) * way
+            if number not in skipped:
+                way = _refracted(way, face_normals(solid)[hit.triangle])
+        return np.degrees(np.arccos(np.clip(np.einsum("ni,ni->n", way, came), -1, 1)))
+
+    assert np.nanmedian(turned(4, ())) < 4.0
+    assert np.nanmedian(turned(4, (1, 2))) > 10.0
+
+
+def _refracted(way: Array, normal: Array) -> Array:
+    """Into glass against the normal, out of it along it; NaN where all is reflected."""
+    cosine = np.einsum("ni,ni->n", way, normal)[:, None]
+    ratio = np.where(cosine < 0, 1 / 1.5, 1.5)
+    with np.errstate(invalid="ignore"):
+        behind = np.sqrt(1 - ratio**2 * (1 - cosine**2))
+    bent: Array = ratio * way + (np.sign(cosine) * behind - ratio * cosine) * normal
+    return bent
+
+
 def test_bottom_lid_knob_and_handle() -> None:
     """What a plumb line and a level one through the handle meet."""
     solid = teapot()

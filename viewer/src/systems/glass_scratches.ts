@@ -4,7 +4,7 @@ import * as THREE from "three";
 import { eyeOf, orbit, type Camera } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
-import { Environment, lampRadiance, lampSteradians } from "./glass_scratches/environment";
+import { lampRadiance, lampSteradians } from "./glass_scratches/environment";
 import { ENDINGS, readEnvironment } from "./glass_scratches/environment_file";
 import { Environments } from "./glass_scratches/environments";
 import { glassOf, type Glass } from "./glass_scratches/glass";
@@ -70,7 +70,7 @@ class ScratchedGlass implements LiveView {
   }
 
   private async take(file: File): Promise<void> {
-    this.environments.add(DROPPED, new Environment(await readEnvironment(file)));
+    this.environments.add(DROPPED, await readEnvironment(file));
     this.settings = { ...this.settings, environment: DROPPED };
     this.context.requestDraw();
   }
@@ -83,7 +83,7 @@ class ScratchedGlass implements LiveView {
     surface.quaternion.setFromAxisAngle(UP, THREE.MathUtils.degToRad(swing)).multiply(leant);
     const intoGlass = surface.quaternion.clone().invert();
     const turned = new THREE.Quaternion().setFromAxisAngle(UP, THREE.MathUtils.degToRad(turn));
-    const radiance = lampRadiance(lamp, this.edge, this.lampColour);
+    const radiance = lampRadiance(lamp, this.environments.shown.mean, this.edge, this.lampColour);
     const behind = this.surroundings.uniforms;
     behind.sky.value = this.environments.shown.texture;
     behind.brightness.value = brightness;
@@ -137,7 +137,8 @@ const viewer: SystemViewer = {
   async make(pkg, context) {
     const edge = pkg.parameter<number[]>("lamp_edge");
     const environment = pkg.parameter<string>("environment");
-    const [glass, environments] = await Promise.all([glassOf(pkg, edge), Environments.of(pkg, environment)]);
+    const exposure = pkg.parameter<number>("exposure");
+    const [glass, environments] = await Promise.all([glassOf(pkg, edge), Environments.of(pkg, environment, exposure)]);
     return new ScratchedGlass(context, glass, environments, edge, pkg.parameter<number[]>("lamp_colour"), {
       ...(environment === "lamps" ? DARK_SET : BRIGHT_SET),
       environment,

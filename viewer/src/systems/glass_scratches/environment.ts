@@ -4,24 +4,26 @@ import * as THREE from "three";
 import { floatOf } from "./halfs";
 import { drawnLights, LIGHTS, luminance, meanLuminance, type Lights, type Radiance } from "./lights";
 
-/** What the mean luminance all around is shown as: the stage's `environment_exposure`. */
-export const SHOWN_MEAN = 0.35;
 const LARGEST_HALF = 65504;
 
 /** Light from far away; all of it is multiplied by the exposure. */
 export class Environment {
   /** RGBA in halfs, row 0 at the nadir. */
   readonly texture: THREE.DataTexture;
-  /** The factor that shows a white matt surface in it as 0.35. */
-  readonly exposure: number;
   /** Exposed. */
   readonly lights: Lights;
   /** Mean radiance all around, exposed: what comes through the glass. */
   readonly through: number;
+  /** Mean luminance all around, exposed. */
+  readonly mean: number;
 
-  /** lights: those of the package, where it has some for this map. */
-  constructor(map: Radiance, lights: Lights = drawnLights(map)) {
-    this.exposure = SHOWN_MEAN / meanLuminance(map);
+  /** exposure: factor on all radiance; lights: those of the package, where it has some for this map. */
+  constructor(
+    map: Radiance,
+    readonly exposure: number,
+    lights: Lights = drawnLights(map),
+  ) {
+    this.mean = exposure * meanLuminance(map);
     this.lights = { power: lights.power.map((power) => power * this.exposure), towards: lights.towards };
     this.through = this.lights.power.reduce((sum, power) => sum + power, 0) / (3 * 4 * Math.PI);
     this.texture = skyTexture(map, this.exposure);
@@ -33,15 +35,20 @@ export class Environment {
   }
 }
 
-/** A map whose numbers are the bits of halfs, and the lights beside it, as packages hold them. */
-export function packedEnvironment(height: number, codes: ArrayLike<number>, packed: Float32Array): Environment {
-  const lights = { power: packed.slice(0, 3 * LIGHTS), towards: packed.slice(3 * LIGHTS) };
-  return new Environment({ height, data: Float32Array.from(codes, floatOf) }, lights);
+/** A map whose numbers are the bits of halfs, as packages hold it. */
+export function packedMap(height: number, codes: ArrayLike<number>): Radiance {
+  return { height, data: Float32Array.from(codes, floatOf) };
 }
 
-/** Radiance of a lamp of some strength, exposed; edge: cosines at which it is none, and all. */
-export function lampRadiance(strength: number, edge: readonly number[], colour: readonly number[]): number[] {
-  const shown = (strength * Math.PI * SHOWN_MEAN) / lampSteradians(edge) / luminance(colour);
+/** Lights beside a map, as packages hold them. */
+export function packedLights(packed: Float32Array): Lights {
+  return { power: packed.slice(0, 3 * LIGHTS), towards: packed.slice(3 * LIGHTS) };
+}
+
+/** Radiance of a lamp of some strength beside an environment of some mean, both exposed; edge: cosines
+ * at which it is none, and all. */
+export function lampRadiance(strength: number, mean: number, edge: readonly number[], colour: readonly number[]): number[] {
+  const shown = (strength * Math.PI * mean) / lampSteradians(edge) / luminance(colour);
   return colour.map((value) => value * shown);
 }
 

@@ -19,6 +19,7 @@ const WEIGHTS = [0.2126, 0.7152, 0.0722];
 /** Of the mean luminance, added to every texel's, so that no light is missed. */
 const FLOOR = 0.01;
 const MARGIN = 1e-9;
+const DARKEST = 1e-3;
 
 /** Rec. 709 luminance of the texel that begins at an index. */
 export function luminance(colours: ArrayLike<number>, at = 0): number {
@@ -33,6 +34,21 @@ export function meanLuminance({ height, data }: Radiance): number {
     for (let texel = row * 2 * height; texel < (row + 1) * 2 * height; texel++) sum += steradians * luminance(data, 3 * texel);
   }
   return sum / (4 * Math.PI);
+}
+
+/** Geometric mean of the luminance over all directions: what is typical, whatever lamps there are.
+ * What is darker than a thousandth of the mean counts as that. */
+export function typicalLuminance(map: Radiance): number {
+  const { height, data } = map;
+  const least = DARKEST * meanLuminance(map);
+  let sum = 0;
+  for (let row = 0; row < height; row++) {
+    const steradians = texelSteradians(row, height);
+    for (let texel = row * 2 * height; texel < (row + 1) * 2 * height; texel++) {
+      sum += steradians * Math.log(Math.max(luminance(data, 3 * texel), least));
+    }
+  }
+  return Math.exp(sum / (4 * Math.PI));
 }
 
 /** Draws the lights, in proportion to luminance. */
