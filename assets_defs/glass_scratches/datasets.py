@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from storage.stored_version import StoredVersion
 
@@ -16,73 +16,107 @@ if TYPE_CHECKING:
     from pipelines.glass_scratches.drawing.frames import GlassFrames
     from pipelines.glass_scratches.layers.features import Layers
     from pipelines.glass_scratches.scratched_glass import ScratchMaterial
-    from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+    from pipelines.glass_scratches.tables.bsdf_table import BsdfTable
+    from pipelines.glass_scratches.tables.fresnel import Fresnel
     from pipelines.glass_scratches.tables.lobe import Lobe
     from pipelines.glass_scratches.tables.table_2d import Table2D
 
 
-def table_2d_dataset(table: Table2D, method: str, roughness: float) -> xr.Dataset:
-    """`scratch_table_2d` of a table, and how it was made."""
-    import xarray as xr
+def paper_table_dataset(table: Table2D, index: float) -> xr.Dataset:
+    """`scratch_table_2d` of the paper's table, in glass of this index."""
+    import numpy as np
 
-    return xr.Dataset(
-        {
-            "rho": (("out", "in"), table.rho),
-            "standard_error": (("out", "in"), table.standard_error),
-            "absorbed": ("in", table.absorbed),
-            "across": (("place", "out", "in"), table.across),
-        },
-        attrs={"method": method, "roughness": roughness},
+    return _table_2d_dataset(
+        "paper", [part[None] for part in table], np.zeros(1), index, keeps=False
     )
 
 
-def table_2d_of(dataset: xr.Dataset) -> Table2D:
-    """The table that a `scratch_table_2d` dataset holds."""
+def glass_table_dataset(table: BsdfTable) -> xr.Dataset:
+    """`scratch_table_2d` of walls of glass."""
+    leans, index = table.leans, table.refractive_index
+    return _table_2d_dataset("glass", table[:4], leans, index, keeps=table.keeps)
+
+
+def _table_2d_dataset(
+    walls: str,
+    parts: Sequence[NDArray[Any]],
+    leans: NDArray[np.float64],
+    index: float,
+    *,
+    keeps: bool,
+) -> xr.Dataset:
+    import xarray as xr
+
+    rho, error, absorbed, across = parts
+    return xr.Dataset(
+        {
+            "rho": (("lean", "out", "in"), rho),
+            "standard_error": (("lean", "out", "in"), error),
+            "absorbed": (("lean", "in"), absorbed),
+            "across": (("lean", "place", "out", "in"), across),
+            "lean": ("lean", leans),
+            "index": ((), index),
+        },
+        attrs={"walls": walls, "keeps_lean": keeps},
+    )
+
+
+def table_2d_of(dataset: xr.Dataset) -> Table2D | BsdfTable:
+    """The table that a `scratch_table_2d` dataset holds: the paper's, or that of walls of glass."""
+    from pipelines.glass_scratches.tables.bsdf_table import BsdfTable
     from pipelines.glass_scratches.tables.table_2d import Table2D
 
-    return Table2D(*(dataset[name].values for name in Table2D._fields))
+    names = ("rho", "standard_error", "absorbed", "across")
+    rho, error, absorbed, across = (dataset[name].values for name in names)
+    if dataset.attrs["walls"] == "paper":
+        return Table2D(rho[0], error[0], absorbed[0], across[0])
+    keeps, index = dataset.attrs["keeps_lean"], float(dataset["index"])
+    return BsdfTable(rho, error, absorbed, across, dataset["lean"].values, keeps, index)
 
 
-def table_dataset(
-    rho: NDArray[np.float64], fresnel: FresnelFactors, lobe: Lobe, refractive_index: float
-) -> xr.Dataset:
-    """`scratch_table` of a table (M, M) with F along the scratch and what sampling needs."""
+def bsdf_table_of(scratch_table_2d: xr.Dataset, fresnel: Fresnel) -> BsdfTable:
+    """The table of both sides that a `scratch_table_2d` dataset leads to; ``fresnel``: how the
+    paper's goes along the scratch."""
+    from pipelines.glass_scratches.tables.bsdf_table import BsdfTable
+    from pipelines.glass_scratches.tables.fresnel import fresnel_factors
+    from pipelines.glass_scratches.tables.paper_table import paper_bsdf_table
+
+    table = table_2d_of(scratch_table_2d)
+    if isinstance(table, BsdfTable):
+        return table
+    index = float(scratch_table_2d["index"])
+    return paper_bsdf_table(table, fresnel_factors(len(table.rho), index, fresnel), index)
+
+
+def table_dataset(table: BsdfTable, lobe: Lobe, fresnel: str) -> xr.Dataset:
+    """`scratch_table` of a table of both sides and what sampling needs."""
     import numpy as np
     import xarray as xr
 
-    from pipelines.glass_scratches.tables.fresnel import TABULATED_THETA
-
-    leaning = (fresnel.factor[:, :, None] * rho).astype(np.float32)
     return xr.Dataset(
         {
-            "rho_s": (("lean", "out", "in"), leaning),
-            "lean": ("lean", np.array(TABULATED_THETA)),
-            "factor": (("lean", "out"), fresnel.factor),
-            "gamma": ("out", fresnel.gamma),
-            "cdf": (("place", "out", "border"), lobe.cdf),
-            "share": (("place", "out"), lobe.share),
-            "index": ((), refractive_index),
-        }
+            "rho": (("lean", "view", "light"), table.rho.astype(np.float32)),
+            "lean": ("lean", table.leans),
+            "cdf": (("lean", "place", "view", "border"), lobe.cdf),
+            "share": (("lean", "place", "view"), lobe.share),
+            "index": ((), table.refractive_index),
+        },
+        attrs={"keeps_lean": table.keeps, "fresnel": fresnel},
     )
 
 
-def fresnel_of(scratch_table: xr.Dataset) -> FresnelFactors:
-    """F as a `scratch_table` dataset holds it."""
-    from pipelines.glass_scratches.tables.fresnel import FresnelFactors
+def scratch_tables_of(
+    scratch_table_2d: xr.Dataset, scratch_table: xr.Dataset
+) -> tuple[BsdfTable, Lobe]:
+    """The table of both sides and its sampler, of a `scratch_table` dataset and the one that it was
+    made from."""
+    import numpy as np
 
-    return FresnelFactors(scratch_table["factor"].values, scratch_table["gamma"].values)
-
-
-def lobe_of(scratch_table_2d: xr.Dataset, scratch_table: xr.Dataset) -> Lobe:
-    """What sampling needs, of a `scratch_table` dataset and the one that it was made from."""
     from pipelines.glass_scratches.tables.lobe import lobe_from_sums
 
-    return lobe_from_sums(
-        scratch_table_2d["across"].values,
-        scratch_table["cdf"].values,
-        scratch_table["share"].values,
-        scratch_table_2d.attrs["roughness"],
-    )
+    made = bsdf_table_of(scratch_table_2d, scratch_table.attrs["fresnel"])
+    table = made._replace(rho=scratch_table["rho"].values.astype(np.float64))
+    return table, lobe_from_sums(table, scratch_table["cdf"].values, scratch_table["share"].values)
 
 
 def layers_dataset(
@@ -161,11 +195,7 @@ def material_of(
     return ScratchMaterial(
         layers_of(scratch_layers),
         scratch_layers["coverage"].values,
-        scratch_table_2d["rho"].values,
-        lobe_of(scratch_table_2d, scratch_table),
-        fresnel_of(scratch_table),
-        scratch_table_2d.attrs["roughness"],
-        float(scratch_table["index"]),
+        *scratch_tables_of(scratch_table_2d, scratch_table),
     )
 
 
@@ -198,7 +228,7 @@ def frames_dataset(frames: GlassFrames, environment: NDArray[np.floating]) -> xr
 
 
 def _lobe(version: StoredVersion) -> Lobe:
-    return lobe_of(version.input("scratch_table_2d"), version.dataset)
+    return scratch_tables_of(version.input("scratch_table_2d"), version.dataset)[1]
 
 
 LOADERS: dict[str, Callable[[StoredVersion], object]] = {
@@ -208,4 +238,5 @@ LOADERS: dict[str, Callable[[StoredVersion], object]] = {
     "scratch_layers": lambda version: layers_of(version.dataset),
     "glass_object": lambda version: solid_of(version.dataset),
 }
-"""What `tsuya.load` gives of an asset: points (P, 2), Table2D, Lobe, Layers, Solid."""
+"""What `tsuya.load` gives of an asset: points (P, 2), Table2D or BsdfTable, Lobe, Layers,
+Solid."""

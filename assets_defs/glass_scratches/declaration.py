@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-SETTINGS = ("setting-1", "setting-2", "mirror", "worn")
-"""Table 1's two; the second with mirror-like walls; and scratches as years leave them."""
+SETTINGS = ("setting-1", "setting-2", "ground", "clear", "worn")
+"""Table 1's two; the second with ground and with clear walls; and scratches as years leave them."""
 OBJECTS = ("plate", "teapot")
 ENVIRONMENTS = ("room", "lamps", "sky", "uniform")
 
@@ -58,9 +58,10 @@ def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDAr
             continue
         for view, words in enumerate(("far", "close")):
             pictures[f"{name}-{words}"] = contact_sheet(np.stack([one[view] for one in frames]))
-        if {"setting-2", "mirror"} <= set(by_setting):
-            pictures[f"{name}-diffuse-beside-specular"] = np.hstack(
-                [np.vstack(list(by_setting[s]["frames"].values)) for s in ("setting-2", "mirror")]
+        if {"setting-2", "clear"} <= set(by_setting):
+            walls = [s for s in ("setting-2", "ground", "clear") if s in by_setting]
+            pictures[f"{name}-diffuse-to-clear"] = np.hstack(
+                [np.vstack(list(by_setting[s]["frames"].values)) for s in walls]
             )
         moving = [dataset["moving"].values for dataset in shown]
         if len({turn.shape for turn in moving}) == 1:

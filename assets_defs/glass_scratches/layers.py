@@ -50,7 +50,8 @@ class LayerSettings(Settings):
         """Table 1's settings, and one that the paper leaves open."""
         looks: dict[str, Any] = {
             "setting-2": {"length": 0.6, "width": 0.01},
-            "mirror": {"length": 0.6, "width": 0.01},
+            "ground": {"length": 0.6, "width": 0.01},
+            "clear": {"length": 0.6, "width": 0.01},
             "worn": {
                 "length": 0.5,
                 "width": 0.005,

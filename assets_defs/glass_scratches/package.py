@@ -54,16 +54,31 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
     """Parts as the datasets have them, by NumPy alone."""
     import numpy as np
 
-    table, along = version.input("scratch_table_2d"), version.input("scratch_table")
-    layers = version.input("scratch_layers")
-    rows = [along["factor"].values[0], along["gamma"].values]
+    table, layers = version.input("scratch_table"), version.input("scratch_layers")
     return {
-        "table": table["rho"].values.astype(np.float16),
-        "leaning": np.array(rows, np.float32),
+        "table": _means(table["rho"].values.astype(np.float64), 64).astype(np.float16),
+        "leans": table["lean"].values.astype(np.float32),
         "angles": layers["angle"].values,
         "coverage": np.round(255.0 * layers["coverage"].values).astype(np.uint8)[..., None],
         "object": _expected_mesh(version.input("glass_object")),
     }
+
+
+def _means(rho: NDArray[np.float64], most: int) -> NDArray[np.float64]:
+    """Tables with at most as many bins a side, by loops over the bins of the fine ones."""
+    import numpy as np
+
+    bins = rho.shape[1] // 2
+    if bins <= most:
+        return rho
+    edges = np.sin(np.linspace(-np.pi / 2, np.pi / 2, bins + 1))
+    weight = np.tile(np.diff(edges), 2)
+    size = bins // most
+    whole = np.add.reduceat(weight, np.arange(0, 2 * bins, size))
+    rows = np.add.reduceat(rho * weight[:, None], np.arange(0, 2 * bins, size), axis=1)
+    both = np.add.reduceat(rows * weight, np.arange(0, 2 * bins, size), axis=2)
+    means: NDArray[np.float64] = both / (whole[:, None] * whole)
+    return means
 
 
 def _expected_mesh(glass_object: xr.Dataset) -> Any:
@@ -115,9 +130,9 @@ def glass_package(
     from storage.packages.glass_scratches import PACKAGE
 
     light = light_of(settings, lineage, glass_frames)
-    glass = _Glass(
-        solid_of(glass_object), material_of(scratch_table_2d, scratch_table, scratch_layers), light
-    )
+    material = material_of(scratch_table_2d, scratch_table, scratch_layers)
+    walls = next(step["settings"] for step in lineage if step["asset"] == "scratch_table_2d")
+    glass = _Glass(solid_of(glass_object), material, light, float(walls["roughness"]))
     views = glass.views(settings.view_size)
     values = glass.parts() | {f"reference_{view.name}": view.frame for view in views}
     values |= {"poster": glass.poster(), "input": _input(scratch_profile)}
@@ -184,12 +199,15 @@ def light_of(
 class _Glass:
     """A scratched solid and its light, as parts and views."""
 
-    def __init__(self, solid: Solid, material: ScratchMaterial, light: _Light) -> None:
+    def __init__(
+        self, solid: Solid, material: ScratchMaterial, light: _Light, roughness: float
+    ) -> None:
         import numpy as np
 
         from pipelines.light.environment_sampling import make_environment_sampler
 
         self.solid, self.material, self.light = solid, material, light
+        self.roughness = roughness
         self.name = next(iter(light.environments))
         self.samplers = {
             name: make_environment_sampler(halfs.astype(np.float32))
@@ -201,14 +219,16 @@ class _Glass:
         import numpy as np
 
         from pipelines.glass_scratches.drawing import live_parts, stage_view
+        from pipelines.glass_scratches.tables.bsdf_table import coarser
         from storage.packages import Mesh
 
+        table = self.material.table
         places, shading, facing = stage_view.corners_apart(self.solid)
         corners = np.arange(len(places), dtype=np.uint32).reshape(-1, 3)
         attributes = {"FACING": facing.astype(np.float32)}
         values: dict[str, Any] = {
-            "table": self.material.rho.astype(np.float16),
-            "leaning": live_parts.leaning_rows(self.material.fresnel),
+            "table": coarser(table.rho, stage_view.TABLE_BINS).astype(np.float16),
+            "leans": table.leans.astype(np.float32),
             "angles": self.material.layers.angle,
             "coverage": live_parts.coverage_codes(self.material.coverage)[..., None],
             "object": Mesh(places.astype(np.float32), corners, shading, attributes=attributes),
@@ -238,9 +258,7 @@ class _Glass:
             self.solid,
             self.material.coverage,
             self.material.layers.angle,
-            self.material.rho,
-            self.material.fresnel,
-            index=self.material.refractive_index,
+            self.material.table,
             tile=self.light.tile,
         )
 
@@ -249,8 +267,9 @@ class _Glass:
         from pipelines.glass_scratches.drawing import stage_view
 
         return {
-            "refractive_index": self.material.refractive_index,
-            "roughness": self.material.roughness,
+            "refractive_index": self.material.table.refractive_index,
+            "keeps_lean": self.material.table.keeps,
+            "roughness": self.roughness,
             "tile": self.light.tile,
             "environment": self.name,
             "exposure": self.light.exposure,
@@ -312,15 +331,14 @@ def _figures(
     glass_frames: xr.Dataset,
 ) -> list[Figure]:
     """Figures of the glass, the paper's beside them."""
-    from pipelines.glass_scratches.figures import table_furnace_error
-    from storage.packages import Figure, PaperFigure
+    from assets_defs.glass_scratches.datasets import table_2d_of
+    from pipelines.glass_scratches.figures import energy_error
+    from storage.packages import Figure
 
-    rho = scratch_table_2d["rho"].values
-    furnace = table_furnace_error(rho, scratch_table_2d["absorbed"].values)
-    middle = float(scratch_table["gamma"].values[len(rho) // 2])
+    share = float(scratch_table["share"].values.mean())
     return [
-        Figure("Gamma, straight on", middle, "1", PaperFigure(8.5476, "by Eq. 2 to 4")),
-        Figure("Light that a table of white walls loses", furnace),
+        Figure("Light that the table loses, at most", energy_error(table_2d_of(scratch_table_2d))),
+        Figure("Part of the light that walls do not keep, mean", share),
         Figure("Coverage of a layer, mean", float(scratch_layers["coverage"].values.mean())),
         Figure("Standard error of the traced picture", float(glass_frames["error"].values.mean())),
     ]

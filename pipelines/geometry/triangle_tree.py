@@ -35,7 +35,8 @@ def triangle_tree(places: NDArray[np.floating], normals: NDArray[np.floating]) -
     """
     if places.shape != normals.shape or places.ndim != 3 or not len(places):
         raise ValueError(
-            f"triangles are {places.shape}, their normals {normals.shape}; expected (F, 3, 3) of both."
+            f"triangles are {places.shape}, their normals {normals.shape}; expected (F, 3, 3), "
+            "one or more of both."
         )
     corners = np.asarray(places, np.float32)
     low, high = corners.min(axis=1), corners.max(axis=1)

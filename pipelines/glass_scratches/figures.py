@@ -9,14 +9,20 @@ from numpy.typing import NDArray
 from pipelines.glass_scratches.layers.coverage import coverage_maps
 from pipelines.glass_scratches.layers.features import Layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
-from pipelines.glass_scratches.tables import sampling
+from pipelines.glass_scratches.tables import bsdf_table, sampling
 from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.bsdf_table import BsdfTable, side_ratio, side_weights
+from pipelines.glass_scratches.tables.glass_paths import shoot_glass_paths
+from pipelines.glass_scratches.tables.glass_table import STEEPEST
+from pipelines.glass_scratches.tables.groove_walls import groove_walls
 from pipelines.glass_scratches.tables.lobe import Direction, Lobe
 from pipelines.glass_scratches.tables.monte_carlo import shoot_paths
 from pipelines.glass_scratches.tables.radiosity import leaving_share
+from pipelines.glass_scratches.tables.table_2d import Table2D
 
 BLOCKS = 16
 _INCIDENCES, _PATHS = 16, 20_000
+_OTHER_SEED = 987_654_321
 
 
 def block_means(rho: NDArray[np.float64], blocks: int = BLOCKS) -> NDArray[np.float64]:
@@ -33,12 +39,23 @@ def block_means(rho: NDArray[np.float64], blocks: int = BLOCKS) -> NDArray[np.fl
     return summed / (blocked[:, None] * blocked)
 
 
-def reciprocity_error(rho: NDArray[np.float64], standard_error: NDArray[np.float64]) -> float:
-    """Largest difference of the block means from their transpose, beyond five standard errors, over
-    the largest block."""
-    blocks = min(BLOCKS, len(rho) // 2)
-    mean = block_means(rho, blocks)
-    error = np.sqrt(_block_variance(standard_error, blocks))
+def energy_error(table: Table2D | BsdfTable) -> float:
+    """Largest part of a beam that neither leaves nor stays."""
+    if isinstance(table, BsdfTable):
+        return bsdf_table.energy_error(table)
+    return float(abs(leaving_share(table.rho) + table.absorbed - 1).max())
+
+
+def reciprocity_error(table: Table2D | BsdfTable) -> float:
+    """Largest difference of a table from its transpose, over its largest value: radiance over n².
+
+    Of the paper's table that of block means, beyond five standard errors, over the largest block.
+    """
+    if isinstance(table, BsdfTable):
+        return bsdf_table.asymmetry(table)
+    blocks = min(BLOCKS, len(table.rho) // 2)
+    mean = block_means(table.rho, blocks)
+    error = np.sqrt(_block_variance(table.standard_error, blocks))
     beyond = np.abs(mean - mean.T) - 5 * np.sqrt(error**2 + error.T**2)
     return float(max(beyond.max(), 0.0) / mean.max())
 
@@ -56,56 +73,90 @@ def _block_variance(standard_error: NDArray[np.float64], blocks: int) -> NDArray
 
 def paths_z_rms(
     profile: NDArray[np.float64],
-    rho: NDArray[np.float64],
-    standard_error: NDArray[np.float64],
+    table: Table2D | BsdfTable,
     *,
     albedo: float,
     roughness: float,
+    seed: int = 0,
 ) -> float:
-    """RMS z-score of a table against new paths from 16 incidences, in 16 blocks of exits each.
+    """RMS z-score of a table against new paths from 16 incidences, in 16 blocks of exits a side.
 
-    The paths' seed is not one that a table is made with.
+    Of walls of glass the table of the middle lean, and the same ground walls that ``seed`` gave;
+    the paths' own seed is not one that a table is made with.
     """
-    bins = len(rho)
-    chosen = np.unique(np.linspace(0, bins - 1, _INCIDENCES).round().astype(np.int64))
-    counts = shoot_paths(
-        profile,
-        bins=bins,
-        rays=_PATHS,
-        paths_per_ray=1,
-        albedo=albedo,
-        roughness=roughness,
-        seed=987_654_321,
-        incidence=chosen,
-    )
-    blocks = min(BLOCKS, bins // 2)
-    weight = bin_weights(bins)[:, None] / np.pi
-    shape = (blocks, bins // blocks, len(chosen))
-    expected = (rho * weight)[:, chosen].reshape(shape).sum(axis=1)
-    own = ((standard_error * weight)[:, chosen] ** 2).reshape(shape).sum(axis=1)
-    seen = counts.leaving.sum(axis=1)[chosen].T.reshape(shape).sum(axis=1) / _PATHS
-    likely = np.maximum(expected, 1.0 / _PATHS)
-    z = (seen - expected) / np.sqrt(likely * np.maximum(1 - likely, 1e-3) / _PATHS + own)
+    bins = table.rho.shape[-1] // (2 if isinstance(table, BsdfTable) else 1)
+    size = table.rho.shape[-1]
+    chosen = np.unique(np.linspace(0, size - 1, _INCIDENCES).round().astype(np.int64))
+    if isinstance(table, BsdfTable):
+        middle = len(table.leans) // 2
+        lean = float(table.leans[middle])
+        slope = 0.0 if roughness == 1.0 else STEEPEST * roughness
+        shot = shoot_glass_paths(
+            groove_walls(profile, slope, seed),
+            lean,
+            bins=bins,
+            index=table.refractive_index,
+            rays=_PATHS,
+            albedo=albedo,
+            even=roughness == 1.0,
+            seed=_OTHER_SEED,
+            incidence=chosen,
+        ).leaving
+        weight = side_weights(bins, side_ratio(lean, table.refractive_index, keeps=table.keeps))
+        rho, standard_error = table.rho[middle], table.standard_error[middle]
+    else:
+        shot = shoot_paths(
+            profile,
+            bins=bins,
+            rays=_PATHS,
+            paths_per_ray=1,
+            albedo=albedo,
+            roughness=1.0,
+            seed=_OTHER_SEED,
+            incidence=chosen,
+        ).leaving
+        weight, rho, standard_error = bin_weights(bins) / np.pi, table.rho, table.standard_error
+    seen = shot.sum(axis=1)[chosen].T / _PATHS
+    expected, own = ((part * weight[:, None])[:, chosen] for part in (rho, standard_error))
+    return _block_z_rms(seen, expected, own, min(BLOCKS, bins // 2) * (size // bins))
+
+
+def _block_z_rms(
+    seen: NDArray[np.float64],
+    expected: NDArray[np.float64],
+    own: NDArray[np.float64],
+    blocks: int,
+) -> float:
+    """RMS z-score of parts of beams (bins, beams), counted of so many paths a beam."""
+    shape = (blocks, len(seen) // blocks, seen.shape[1])
+    found, likely = (part.reshape(shape).sum(axis=1) for part in (seen, expected))
+    variance = (own**2).reshape(shape).sum(axis=1)
+    least = np.maximum(likely, 1.0 / _PATHS)
+    z = (found - likely) / np.sqrt(least * np.maximum(1 - least, 1e-3) / _PATHS + variance)
     return float(np.sqrt(np.mean(z**2)))
 
 
 def sampler_p_value(lobe: Lobe, samples: int = 40_000) -> float:
-    """p-value of a chi-square test: sampled lights in cells of (phi, theta) against the density.
+    """p-value of a chi-square test: sampled lights in cells of (phi, lean) against the density.
 
-    For a few views and places across the opening; the least p-value times their number.
+    For a few views of both sides, and places across the opening; the least p-value times their
+    number.
     """
     from scipy.stats import chi2
 
-    views = ((0.0, 0.0), (0.4, 0.9), (-0.7, -0.5))
-    columns, rows = min(16, lobe.rho.shape[1] // 2), 12
+    views = ((0.0, 0.0, 1.0), (0.4, 0.9, 1.0), (-0.7, -0.5, 1.0), (0.2, -0.4, -1.0))
+    columns, rows = 2 * min(16, len(lobe.sines) // 2), 12
     least, tested = 1.0, 0
-    for number, (theta, phi) in enumerate(views):
-        view = Direction(np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi))
-        for place in (1, len(lobe.rho) // 2):
-            u = np.random.default_rng(number).random((samples, 3))
-            found = np.zeros((rows, columns))
+    for number, (theta, phi, side) in enumerate(views):
+        view = Direction(
+            np.sin(theta), np.cos(theta) * np.sin(phi), side * np.cos(theta) * np.cos(phi)
+        )
+        for place in (1, lobe.rho.shape[1] // 2):
+            u = np.random.default_rng(number).random((samples, 4))
+            found, expected = np.zeros((2, rows, columns))
             _count(lobe, place, view, u, found)
-            expected = samples * _expected(lobe, place, view, rows, columns)
+            _expect(lobe, place, view, expected)
+            expected *= samples
             order = np.argsort(expected.ravel())
             # Cells with few expected are joined until there are enough in each.
             groups = np.cumsum(expected.ravel()[order]) // 8
@@ -163,16 +214,11 @@ def opening_tilt(points: NDArray[np.float64]) -> float:
     return float(abs(points[[0, -1], 1]).max() + max(points[:, 1].max(), 0.0))
 
 
-def table_furnace_error(rho: NDArray[np.float64], absorbed: NDArray[np.float64]) -> float:
-    """Largest part of a beam that neither leaves nor stays: table (M, M), absorbed (M,)."""
-    return float(abs(leaving_share(rho) + absorbed - 1).max())
-
-
 def across_error(across: NDArray[np.float32], rho: NDArray[np.float64]) -> float:
-    """Largest difference of the mean of tables across the opening (places, M, M) from the table
-    (M, M), over its largest value."""
-    mean = across.mean(axis=0, dtype="float64")
-    return float(abs(mean - rho.T).max() / rho.max())
+    """Largest difference of the mean of tables across the opening (S, places, M, M) from the tables
+    (S, M, M), over the largest value."""
+    mean = across.mean(axis=1, dtype="float64")
+    return float(abs(mean - rho.transpose(0, 2, 1)).max() / rho.max())
 
 
 def coverage_error(maps: NDArray[np.float32], spec: LayerSpec) -> float | None:
@@ -231,34 +277,41 @@ def impossible_share(radiance: NDArray[np.floating]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
-    rows, columns = found.shape
-    for i in range(len(u)):
-        a, v, n = sampling.sample(lobe, place, view, u[i, 0], u[i, 1], u[i, 2])
-        row = min(int(sampling.theta_quantile(a) * rows), rows - 1)
-        found[row, sampling.phi_bin(v, n, columns)] += 1.0
+def _cell(lobe, light, rows, columns):  # type: ignore[no-untyped-def]
+    """A light's row, by its lean over all that its side has, and column, of both sides."""
+    row = min(int((light.u + 1.0) / 2.0 * rows), rows - 1)
+    bins = len(lobe.sines) - 1
+    return row, sampling.side_bin(light, bins) * columns // (2 * bins)
 
 
 @njit(cache=True, nogil=True)
-def _expected(lobe, place, view, rows, columns):  # type: ignore[no-untyped-def]
-    """Integral of the density over cells of equal quantile and equal phi, by the midpoints of
-    narrow strips: the measure of a direction is dphi cos theta dtheta."""
-    part = np.zeros((rows, columns))
-    bins = lobe.rho.shape[1]
-    fine, steps = 64, 8
+def _count(lobe, place, view, u, found):  # type: ignore[no-untyped-def]
+    rows, columns = found.shape
+    for i in range(len(u)):
+        light = sampling.sample(lobe, place, view, (u[i, 0], u[i, 1], u[i, 2], u[i, 3]))
+        row, column = _cell(lobe, light, rows, columns)
+        found[row, column] += 1.0
+
+
+@njit(cache=True, nogil=True)
+def _expect(lobe, place, view, part):  # type: ignore[no-untyped-def]
+    """Integral of the density over cells of equal steps of u and equal phi, by the midpoints of
+    narrow strips: the measure of a direction is du dphi."""
+    rows, columns = part.shape
+    bins = len(lobe.sines) - 1
+    fine = 400
     for row in range(rows):
         for strip in range(fine):
-            along = sampling.sine_of_quantile((row + (strip + 0.5) / fine) / rows)
-            rest2 = 1.0 - along * along
-            for column in range(bins):
-                low, high = lobe.sines[column], lobe.sines[column + 1]
-                for step in range(steps):
-                    # Middles in the sine of phi: cos theta dtheta = d(quantile) pi / (2 cos theta)
-                    sine = low + (step + 0.5) / steps * (high - low)
-                    cosine = np.sqrt(max(1.0 - sine * sine, 1e-18))
-                    rest = np.sqrt(rest2)
-                    light = Direction(along, rest * sine, rest * cosine)
-                    density = sampling.pdf(lobe, place, view, light)
-                    size = (high - low) / steps / cosine * np.pi / (2.0 * rest * rows * fine)
-                    part[row, column * columns // bins] += density * size
-    return part
+            along = 2.0 * (row + (strip + 0.5) / fine) / rows - 1.0
+            rest = np.sqrt(1.0 - along * along)
+            for both in range(2 * bins):
+                low, high = lobe.sines[both % bins], lobe.sines[both % bins + 1]
+                # In a bin the density falls with cos phi alone, whose mean is known.
+                middle = 0.5 * (np.arcsin(high) + np.arcsin(low))
+                up = rest * np.cos(middle)
+                side = 1.0 if both < bins else -1.0
+                light = Direction(along, rest * np.sin(middle), side * up)
+                density = sampling.pdf(lobe, place, view, light) / np.cos(middle)
+                size = (high - low) * 2.0 / (rows * fine)
+                _, column = _cell(lobe, light, rows, columns)
+                part[row, column] += density * size

@@ -40,9 +40,7 @@ class ScratchedGlass(NamedTuple):
     actor: ScratchedActor
 
 
-def scratch_material(
-    table: BsdfTable, layers: Layers, *, resolution: int = 512
-) -> ScratchMaterial:
+def scratch_material(table: BsdfTable, layers: Layers, *, resolution: int = 512) -> ScratchMaterial:
     """Scratches of ``layers`` that have this table.
 
     ``resolution`` of the layers' maps, a power of two. Raises ValueError as `coverage_maps` does.

@@ -25,51 +25,64 @@ SCRATCH_PROFILE = Schema(
 SCRATCH_TABLE_2D = Schema(
     _SYSTEM,
     "scratch_table_2d",
-    1,
-    "The scratch BRDF in the cross-section: a beam from bin i leaves into bin o with probability "
-    "rho w / pi, w = integral of cos phi over bin o.",
+    2,
+    "What walls do to light in the cross-section. Walls of glass: bins of phi outside and inside; "
+    "tables of leans; a beam from bin i leaves into bin o with probability rho w r / pi, w = "
+    "integral of cos phi over bin o, r = 1 outside, inside the ratio of étendue. The paper's: one "
+    "table, of the bins outside.",
     {
-        "rho": Variable(("out", "in"), "float64", "1", "rho_m(phi_o, phi_i)", "Eq. 1"),
+        "rho": Variable(("lean", "out", "in"), "float64", "1", "rho_m(phi_o, phi_i)", "Eq. 1"),
         "standard_error": Variable(
-            ("out", "in"), "float64", "1", "Standard error of rho_m; 0 where it was solved for"
+            ("lean", "out", "in"),
+            "float64",
+            "1",
+            "Standard error of rho_m; 0 where it was solved for",
         ),
-        "absorbed": Variable(("in",), "float64", "1", "Part of the beam that the walls keep"),
+        "absorbed": Variable(("lean", "in"), "float64", "1", "Part of the beam that walls keep"),
         "across": Variable(
-            ("place", "out", "in"),
+            ("lean", "place", "out", "in"),
             "float32",
             "1",
             "rho_m by the place where the view's ray enters the opening, from the left end",
         ),
+        "lean": Variable(
+            ("lean",),
+            "float64",
+            "1",
+            "Component along the scratch times the refractive index, where walls keep it; the last "
+            "table is that from 1 on",
+        ),
+        "index": Variable((), "float64", "1", "Refractive index of the glass", "Eq. 2, n"),
     },
 )
 
 SCRATCH_TABLE = Schema(
     _SYSTEM,
     "scratch_table",
-    1,
-    "The scratch BRDF along the scratch: three leans, the exponent between them, the sampler.",
+    2,
+    "The scratch BSDF as it is looked up: both sides of the surface, along the scratch, sampler.",
     {
-        "rho_s": Variable(
-            ("lean", "out", "in"),
+        "rho": Variable(
+            ("lean", "view", "light"),
             "float32",
             "1",
-            "rho_s at the leans theta_o of the view",
-            "Eq. 2, 3",
+            "What a view of a lean gets from a bin is rho w r / pi of its radiance over n squared",
+            "Eq. 2 to 4",
         ),
-        "lean": Variable(("lean",), "float64", "radian", "Tabulated theta_o", "section 3.1"),
-        "factor": Variable(("lean", "out"), "float64", "1", "Fresnel's factor on rho_m", "Eq. 2"),
-        "gamma": Variable(("out",), "float64", "1", "Exponent of the interpolation", "Eq. 4"),
+        "lean": Variable(
+            ("lean",), "float64", "1", "Component along the scratch times the refractive index"
+        ),
         "cdf": Variable(
-            ("place", "out", "border"),
+            ("lean", "place", "view", "border"),
             "float32",
             "1",
-            "Share of the reflected light below each bin's border, by place and view",
+            "Share of the light of a view below each bin's border, by lean and place",
             "Eq. 5",
         ),
         "share": Variable(
-            ("place", "out"), "float32", "1", "Part of the light that the walls give back"
+            ("lean", "place", "view"), "float32", "1", "Part of the light that walls do not keep"
         ),
-        "index": Variable((), "float64", "1", "Refractive index", "Eq. 2, n"),
+        "index": Variable((), "float64", "1", "Refractive index of the glass", "Eq. 2, n"),
     },
 )
 

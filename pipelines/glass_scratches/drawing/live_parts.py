@@ -13,7 +13,6 @@ from pipelines.drawing.stage import Camera, orbit
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing.frames import object_cameras
 from pipelines.glass_scratches.drawing.stage_view import Lamp, ScratchedActor, draw_scratched
-from pipelines.glass_scratches.tables.fresnel import FresnelFactors
 from pipelines.light.environment_maps import Radiance, check_environment
 from pipelines.light.environment_sampling import EnvironmentSampler
 
@@ -59,11 +58,6 @@ def coverage_codes(coverage: NDArray[np.float32]) -> NDArray[np.uint8]:
     [0, 128, 255]
     """
     return np.rint(coverage * 255.0).astype(np.uint8)
-
-
-def leaning_rows(fresnel: FresnelFactors) -> NDArray[np.float32]:
-    """What the shader needs of Fresnel's factor, (2, M): at theta = 0, and the exponent."""
-    return np.stack([fresnel.factor[0], fresnel.gamma]).astype(np.float32)
 
 
 class ReferenceView(NamedTuple):

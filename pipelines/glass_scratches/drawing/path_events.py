@@ -86,7 +86,7 @@ def _meet_glass(glass, paths, i, hits, depth, results):  # type: ignore[no-untyp
             place = _lobe_place(surface.lobe, scratch.place)
             goes_on = scatter(glass, paths, i, frame, place, event, u_choice, results)
     else:
-        reflect_or_refract(paths, i, point, surface.lobe.index, u_choice, depth)
+        reflect_or_refract(paths, i, point, surface.lobe.refractive_index, u_choice, depth)
     if goes_on:
         side = 1.0 if dot(row_vector(paths.direction, i), point.face) > 0.0 else -1.0
         set_row(paths.origin, i, stepped(point.position, side * glass.offset, point.face))

@@ -25,53 +25,53 @@ def profile_picture(points: NDArray[np.float64]) -> NDArray[np.uint8]:
     return canvas_picture(canvas)
 
 
-def table_picture(rho: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """The table as an image, and figure 2: rho_m over phi_o around three incidences."""
+def table_picture(rho: NDArray[np.float64], both_sides: bool) -> NDArray[np.uint8]:
+    """A table as an image, and figure 2: rho_m over phi_o around three incidences.
+
+    ``both_sides``: bins outside, then inside the glass, which are drawn below the surface.
+    """
     figure, canvas = new_figure(10.0, 4.2)
-    angles = bin_centres(len(rho))
+    bins = len(rho) // 2 if both_sides else len(rho)
+    angles = bin_centres(bins)
     left = figure.add_subplot(1, 2, 1)
-    shown = left.imshow(
-        rho,
-        origin="lower",
-        extent=(-90, 90, -90, 90),
-        cmap="magma",
-        vmin=0.0,
-        vmax=float(np.quantile(rho, 0.995)),
-    )
+    shown = left.imshow(rho, origin="lower", cmap="magma", vmax=float(np.quantile(rho, 0.995)))
+    ticks = np.arange(0, len(rho) + 1, bins // 2) - 0.5
+    names = ["-90", "0", "90 | -90", "0", "90"] if both_sides else ["-90", "0", "90"]
+    left.set_xticks(ticks, names)
+    left.set_yticks(ticks, names)
     left.set(xlabel="φi, degrees", ylabel="φo, degrees", title="ρm(φo, φi)")
     figure.colorbar(shown, ax=left)
     right = figure.add_subplot(1, 2, 2, projection="polar")
     right.set_theta_zero_location("N")
     right.set_theta_direction(-1)
-    right.set_thetamin(-90)
-    right.set_thetamax(90)
-    half = max(1, len(rho) // 128)
+    around = np.concatenate([angles, np.pi - angles[::-1]]) if both_sides else angles
+    if not both_sides:
+        right.set_thetamin(-90)
+        right.set_thetamax(90)
+    half = max(1, bins // 128)
     longest = 0.0
     for incidence, colour in zip(_SHOWN_INCIDENCES, ("#b8860b", "#20506a", "#8b2252"), strict=True):
         at = int(np.argmin(np.abs(angles - np.radians(incidence))))
         lobe = rho[:, max(at - half, 0) : at + half + 1].mean(axis=1)
-        longest = max(longest, float(lobe.max()))
-        right.plot(angles, lobe, color=colour, label=f"φi = {incidence:g}°")
-        right.fill(angles, lobe, color=colour, alpha=0.12)
+        lobe = np.concatenate([lobe[:bins], lobe[bins:][::-1]])
+        longest = max(longest, float(np.quantile(lobe, 0.98)))
+        right.plot(around, lobe, color=colour, label=f"φi = {incidence:g}°")
+        right.fill(around, lobe, color=colour, alpha=0.12)
     right.set_ylim(0.0, 1.1 * longest)
     right.legend(loc="lower center", fontsize=8)
     return canvas_picture(canvas)
 
 
-def fresnel_picture(factor: NDArray[np.float64], gamma: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Fresnel's factor over theta_o as it is interpolated, for three views phi_o."""
-    figure, canvas = new_figure(5.4, 3.4)
-    axis = figure.subplots()
-    theta = np.linspace(0.0, np.pi / 2, 200)
-    angles = bin_centres(len(gamma))
-    for view in _SHOWN_INCIDENCES:
-        at = int(np.argmin(np.abs(angles - np.radians(view))))
-        share = (2 * theta / np.pi) ** gamma[at]
-        curve = share * factor[2, at] + (1 - share) * factor[0, at]
-        axis.plot(np.degrees(theta), curve, label=f"φo = {view:g}°, γ = {gamma[at]:.3g}")
-        axis.plot([0, 60, 90], factor[:, at], "o", color="0.3", markersize=4)
-    axis.set(xlabel="θo, degrees", ylabel="ρs / ρm", ylim=(0, 1.05))
-    axis.legend(fontsize=8)
+def leans_picture(rho: NDArray[np.float32], leans: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Tables (S, 2 M view, 2 M light) of their leans, outside and inside: what becomes of a
+    view."""
+    figure, canvas = new_figure(2.2 * len(leans) + 0.4, 2.6)
+    top = float(np.quantile(rho, 0.99))
+    for number, (table, lean) in enumerate(zip(rho, leans, strict=True)):
+        axis = figure.add_subplot(1, len(leans), number + 1)
+        axis.imshow(table, origin="lower", cmap="magma", vmin=0.0, vmax=top)
+        axis.set_title(f"lean {lean:g}", fontsize=9)
+        axis.set_axis_off()
     return canvas_picture(canvas)
 
 

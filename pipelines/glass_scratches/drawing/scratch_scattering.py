@@ -137,7 +137,7 @@ def _drawn(glass, at, event, u):  # type: ignore[no-untyped-def]
             glass.environment,
             glass.faces.flats,
             at.frame.normal,
-            surface.lobe.index,
+            surface.lobe.refractive_index,
             (u / at.aimed, u1, u2),
         )
         light = _in_frame(at.frame, way)
@@ -155,7 +155,7 @@ def _density(glass, at, light):  # type: ignore[no-untyped-def]
     if at.aimed > 0.0 and light.n < 0.0:
         way = _in_scene(at.frame, light)
         density += at.aimed * inward_pdf(
-            glass.environment, glass.faces.flats, at.frame.normal, lobe.index, way
+            glass.environment, glass.faces.flats, at.frame.normal, lobe.refractive_index, way
         )
     return density
 

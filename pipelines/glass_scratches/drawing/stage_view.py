@@ -1,7 +1,7 @@
 """The same glass on the stage: a shader that looks the scratch table up (section 3.3, Eq. 5).
 
-What a frame of a game would show, without noise: what is seen is followed through the glass, bent at
-each surface; what is reflected on the way is looked up in the environment. Scratches whose walls
+What a frame of a game would show, without noise: what is seen is followed through the glass, bent
+at each surface; what is reflected on the way is looked up in the environment. Scratches whose walls
 scatter evenly are lit by a fixed number of lights drawn from the environment by its radiance; those
 whose walls keep the lean show what lies along it. Lights behind the glass are seen through one more
 face, parallel to the scratched one, and what light does that cannot leave there is not followed.
@@ -92,7 +92,7 @@ class ScratchedActor:
             "LEANS": len(table.leans),
             "LEAN_VALUES": [float(lean) for lean in table.leans],
             "KEEPS": bool(table.keeps),
-            "INDEX": float(table.index),
+            "INDEX": float(table.refractive_index),
             "TILE": float(tile),
         }
 
@@ -109,7 +109,9 @@ class ScratchedActor:
             position = np.asarray(camera.target) + 1e4 * (position - np.asarray(camera.target))
         image = np.ascontiguousarray(environment.radiance)
         textures = {
-            name: texture(values, wrap="repeat", mipmap=name.startswith("coverage"), anisotropic=False)
+            name: texture(
+                values, wrap="repeat", mipmap=name.startswith("coverage"), anisotropic=False
+            )
             for name, values in self._maps.items()
         }
         textures |= {
@@ -191,10 +193,10 @@ def soft_radiance(radiance: NDArray[np.floating]) -> NDArray[np.float32]:
     import cv2
 
     rows = min(len(radiance), TABLE_BINS)
-    soft: NDArray[np.float32] = cv2.resize(
+    soft = cv2.resize(
         np.asarray(radiance, np.float32), (2 * rows, rows), interpolation=cv2.INTER_AREA
     )
-    return soft
+    return np.asarray(soft, np.float32)
 
 
 def environment_lights(environment: EnvironmentSampler) -> tuple[NDArray[np.float32], float]:

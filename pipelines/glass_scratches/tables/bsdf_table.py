@@ -36,7 +36,7 @@ class BsdfTable(NamedTuple):
     across: NDArray[np.float32]
     leans: NDArray[np.float64]
     keeps: bool
-    index: float
+    refractive_index: float
 
 
 def side_ratio(lean: float, index: float, *, keeps: bool) -> float:
@@ -65,7 +65,8 @@ def lean_weights(
 
 def beam_shares(table: BsdfTable) -> NDArray[np.float64]:
     """Part (S, 2 M) of the light of each view that the walls let through or give back."""
-    weights = lean_weights(table.rho.shape[-1] // 2, table.leans, table.index, keeps=table.keeps)
+    bins, index = table.rho.shape[-1] // 2, table.refractive_index
+    weights = lean_weights(bins, table.leans, index, keeps=table.keeps)
     return np.einsum("sl,svl->sv", weights, table.rho)
 
 

@@ -78,12 +78,13 @@ def shoot_glass_paths(
 
 
 class _Optics(NamedTuple):
-    """k outside and inside, the refractive index, the part of light that a wall does not keep, and
-    that of light from the air which walls that scatter evenly give back (below 0: clear walls)."""
+    """k outside and inside, the glass's refractive index, the part of light that a wall does not
+    keep, and that of light from the air which walls that scatter evenly give back (below 0: clear
+    walls)."""
 
     outside: float
     inside: float
-    index: float
+    glass: float
     albedo: float
     reflected: float
 
@@ -177,9 +178,9 @@ def _at_wall(optics, in_glass, sine):  # type: ignore[no-untyped-def]
     """What a wall reflects of light with this sine to its normal, in the cross-section, and the
     sine behind it."""
     if optics.reflected >= 0.0:
-        let_out = (1.0 - optics.reflected) / optics.index**2
+        let_out = (1.0 - optics.reflected) / optics.glass**2
         return (1.0 - let_out if in_glass else optics.reflected), 0.0
-    own, other, n_own, n_other = optics.outside, optics.inside, 1.0, optics.index
+    own, other, n_own, n_other = optics.outside, optics.inside, 1.0, optics.glass
     if in_glass:
         own, other, n_own, n_other = other, own, n_other, n_own
     rest = other * other - own * own * sine * sine

@@ -71,7 +71,7 @@ def factors_of_both_sides(profile: NDArray[np.float64], bins: int, facets: int) 
 
 def _below(points: NDArray[np.float64], low: int, width: float) -> NDArray[np.float64]:
     """What lies between a lowest point and the next groove's, upside down."""
-    around = np.concatenate([points[low:], points[1 : low + 1] + [width, 0.0]])
+    around = np.concatenate([points[low:], points[1 : low + 1] + np.array([width, 0.0])])
     return np.stack([around[:, 0] - around[0, 0], around[0, 1] - around[:, 1]], axis=-1)
 
 

@@ -22,7 +22,7 @@ from pipelines.glass_scratches.tables.glass_radiosity import (
 )
 from pipelines.glass_scratches.tables.groove_walls import groove_walls
 from pipelines.glass_scratches.tables.monte_carlo import PLACES
-from pipelines.glass_scratches.tables.walls import check_roughness
+from pipelines.glass_scratches.tables.walls import Method, check_roughness, table_method
 
 LEANS = (0.0, 0.35, 0.55, 0.7, 0.82, 0.91, 0.97)
 """That tables of walls which keep the lean are made for; and one from 1 on."""
@@ -40,6 +40,7 @@ def glass_table(
     index: float,
     roughness: float = 1.0,
     albedo: float = 1.0,
+    method: Method | None = None,
     facets: int = 128,
     rays: int = 40_000,
     seed: int = 0,
@@ -49,10 +50,11 @@ def glass_table(
 
     roughness: 1 walls scatter evenly (the paper's), solved for with ``facets`` facets; 0 they are
     clear; between, ground to ridges with slopes of standard deviation 0.6 roughness. Of those
-    ``rays`` paths a bin are counted. albedo: what walls do not keep of light each time.
+    ``rays`` paths a bin are counted. albedo: what walls do not keep of light each time. method:
+    ``paths`` counts those of walls that scatter evenly, too.
 
-    Raises ValueError for a roughness or an albedo outside [0, 1], and where walls as rough would
-    cross.
+    Raises ValueError for a roughness or an albedo outside [0, 1], for an exact table of walls that
+    do not scatter evenly, and where walls as rough would cross.
 
     >>> from pipelines.glass_scratches.tables.profiles import built_in_profile
     >>> even = glass_table(built_in_profile("v", 10.0, 4.0), bins=8, index=1.5, facets=20)
@@ -62,19 +64,27 @@ def glass_table(
     True
     """
     check_roughness(roughness)
-    if roughness == 1.0:
+    even = roughness == 1.0
+    if table_method(method, roughness) == "exact":
         return _even_table(profile, bins, index, albedo, facets)
-    walls = groove_walls(profile, STEEPEST * roughness, seed)
+    walls = groove_walls(profile, 0.0 if even else STEEPEST * roughness, seed)
     tables = []
-    leans = (*LEANS, 1.0)
+    leans = (0.0,) if even else (*LEANS, 1.0)
     for number, lean in enumerate(leans):
         counted = shoot_glass_paths(
-            walls, lean, bins=bins, index=index, rays=rays, albedo=albedo, seed=seed + number
+            walls,
+            lean,
+            bins=bins,
+            index=index,
+            rays=rays,
+            albedo=albedo,
+            even=even,
+            seed=seed + number,
         )
-        tables.append(table_of_glass_paths(counted, side_ratio(lean, index, keeps=True)))
+        tables.append(table_of_glass_paths(counted, side_ratio(lean, index, keeps=not even)))
         progress((number + 1) / len(leans))
     rho, error, absorbed, across = (np.stack(part) for part in zip(*tables, strict=True))
-    return BsdfTable(rho, error, absorbed, across, np.array(leans), True, index)
+    return BsdfTable(rho, error, absorbed, across, np.array(leans), not even, index)
 
 
 def _even_table(

@@ -40,7 +40,7 @@ class Lobe(NamedTuple):
     leans: NDArray[np.float64]
     keeps: bool
     sines: NDArray[np.float64]
-    index: float
+    refractive_index: float
     blur: float
 
 
@@ -48,9 +48,8 @@ def make_lobe(table: BsdfTable) -> Lobe:
     """The lobe of a table of both sides.
 
     >>> flat = np.full((1, 16, 16), np.pi / 2 / 3.25)
-    >>> table = BsdfTable(
-    ...     flat, 0 * flat, np.zeros((1, 16)), flat[:, None].astype(np.float32), np.zeros(1), False, 1.5
-    ... )
+    >>> across = flat[:, None].astype(np.float32)
+    >>> table = BsdfTable(flat, 0 * flat, np.zeros((1, 16)), across, np.zeros(1), False, 1.5)
     >>> lobe = make_lobe(table)
     >>> lobe.cdf.shape, round(float(lobe.share[0, 0, 0]), 6)
     ((1, 1, 16, 17), 1.0)
@@ -66,9 +65,7 @@ def make_lobe(table: BsdfTable) -> Lobe:
     return lobe_from_sums(table, cdf, share.astype(np.float32))
 
 
-def lobe_from_sums(
-    table: BsdfTable, cdf: NDArray[np.float32], share: NDArray[np.float32]
-) -> Lobe:
+def lobe_from_sums(table: BsdfTable, cdf: NDArray[np.float32], share: NDArray[np.float32]) -> Lobe:
     """A lobe whose sums were made before."""
     return Lobe(
         table.across,
@@ -78,11 +75,11 @@ def lobe_from_sums(
         table.leans,
         table.keeps,
         np.sin(bin_edges(table.across.shape[-1] // 2)),
-        float(table.index),
+        float(table.refractive_index),
         _LEAST_BLUR,
     )
 
 
 def _weights(table: BsdfTable) -> NDArray[np.float64]:
     bins = table.across.shape[-1] // 2
-    return lean_weights(bins, table.leans, table.index, keeps=table.keeps)
+    return lean_weights(bins, table.leans, table.refractive_index, keeps=table.keeps)

@@ -33,7 +33,7 @@ def paper_bsdf_table(table: Table2D, fresnel: FresnelFactors, index: float) -> B
     factor = interpolated_fresnel(fresnel, np.arcsin(leans))  # (S, M)
     mean = _mean_over_leans(fresnel)
     even = np.pi / 2 / index**2
-    inside = 1.0 - (bin_weights(len(mean)) / 2) @ (1.0 - mean) / index**2
+    inside = 1.0 - float(bin_weights(len(mean)) @ (1.0 - mean)) / 2 / index**2
     across = np.stack(
         [_both_sides(place, factor, mean, even, inside) for place in table.across], axis=1
     )

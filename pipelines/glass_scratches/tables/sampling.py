@@ -11,8 +11,8 @@ spread evenly over the bin's sines, and over leans
 
 What a view gets is the sum of what it has from each direction: part times radiance over n².
 
-Between the leans of tables is interpolated. The view's phi is taken at the nearest bin. So evaluate,
-sample and pdf agree exactly.
+Between the leans of tables is interpolated. The view's phi is taken at the nearest bin. So
+evaluate, sample and pdf agree exactly.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def side_bin(direction, bins):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, inline="always")
 def _lean(lobe, direction):  # type: ignore[no-untyped-def]
     u, _, n = direction
-    return u if n > 0.0 else u * lobe.index
+    return u if n > 0.0 else u * lobe.refractive_index
 
 
 @njit(cache=True, nogil=True)
@@ -63,7 +63,7 @@ def _tables(lobe, view):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True)
 def _lean_density(lobe, view, light):  # type: ignore[no-untyped-def]
     """Density of the light's lean, for the view's."""
-    side = 1.0 if light.n > 0.0 else lobe.index
+    side = 1.0 if light.n > 0.0 else lobe.refractive_index
     lean = light.u * side
     if not lobe.keeps:
         return 2.0 * np.sqrt(max(side * side - lean * lean, 0.0)) / (np.pi * side * side)
@@ -80,7 +80,7 @@ def _spread(lobe, view, light, column):  # type: ignore[no-untyped-def]
     """What turns a part of a bin into a density per steradian of its side."""
     bins = len(lobe.sines) - 1
     width = lobe.sines[column % bins + 1] - lobe.sines[column % bins]
-    side = 1.0 if light.n > 0.0 else lobe.index
+    side = 1.0 if light.n > 0.0 else lobe.refractive_index
     rest = np.sqrt(max(1.0 - light.u * light.u, 1e-12))
     return _lean_density(lobe, view, light) * side * abs(light.n) / (rest * width)
 
@@ -153,7 +153,7 @@ def sample(lobe, place, view, numbers):  # type: ignore[no-untyped-def]
     inside = min(max((u1 - row[first]) / width, 0.0), 1.0) if width > 0 else 0.5
     column = first % bins
     sine = lobe.sines[column] + inside * (lobe.sines[column + 1] - lobe.sines[column])
-    side = 1.0 if first < bins else lobe.index
+    side = 1.0 if first < bins else lobe.refractive_index
     along = _sampled_lean(lobe, view, side, u2, u3) / side
     rest = np.sqrt(max(1.0 - along * along, 0.0))
     up = rest * np.sqrt(max(1.0 - sine * sine, 0.0))

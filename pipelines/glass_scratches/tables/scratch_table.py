@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +12,7 @@ from pipelines.glass_scratches.tables.radiosity import (
     view_factors,
 )
 from pipelines.glass_scratches.tables.table_2d import Table2D
-from pipelines.glass_scratches.tables.walls import check_roughness
-
-Method = Literal["exact", "paths"]
+from pipelines.glass_scratches.tables.walls import Method, check_roughness, table_method
 
 _FINE = 16
 
@@ -72,21 +68,6 @@ def scratch_brdf_table(
     )
     across = counted.across.astype(np.float32)
     return Table2D(counted.rho, counted.standard_error, counted.absorbed, across)
-
-
-def table_method(method: Method | None, roughness: float) -> Method:
-    """The method that was asked for; by default the exact one where walls are diffuse.
-
-    Raises ValueError for an exact table of walls that are not.
-
-    >>> table_method(None, 1.0), table_method(None, 0.0)
-    ('exact', 'paths')
-    """
-    if method == "exact" and roughness != 1.0:
-        raise ValueError(
-            f"roughness is {roughness:g} with the method exact; expected 1, or the method paths."
-        )
-    return method or ("exact" if roughness == 1.0 else "paths")
 
 
 def _across(

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
+
+Method = Literal["exact", "paths"]
+"""How a table is made: by a linear system, or by counting paths."""
 
 
 def check_albedo(albedo: float) -> None:
@@ -28,3 +33,18 @@ def bounce_blur(roughness: float) -> float:
     """
     check_roughness(roughness)
     return np.inf if roughness == 1.0 else roughness / (1.0 - roughness)
+
+
+def table_method(method: Method | None, roughness: float) -> Method:
+    """The method that was asked for; by default the exact one where walls are diffuse.
+
+    Raises ValueError for an exact table of walls that are not.
+
+    >>> table_method(None, 1.0), table_method(None, 0.0)
+    ('exact', 'paths')
+    """
+    if method == "exact" and roughness != 1.0:
+        raise ValueError(
+            f"roughness is {roughness:g} with the method exact; expected 1, or the method paths."
+        )
+    return method or ("exact" if roughness == 1.0 else "paths")
