@@ -18,20 +18,13 @@ from pipelines.glass_scratches.layers.features import Layers
 from pipelines.glass_scratches.layers.scratch_layers import make_layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.scratched_glass import scratch_material
-from pipelines.glass_scratches.tables.fresnel import fresnel_factors
+from pipelines.glass_scratches.tables.glass_table import glass_table
 from pipelines.glass_scratches.tables.lobe import make_lobe
 from pipelines.glass_scratches.tables.profiles import built_in_profile
 from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
-from pipelines.glass_scratches.tables.table_2d import Table2D
 from storage.schemas import glass_scratches as schemas
 
-ROUGHNESS = 0.3
-
-
-@pytest.fixture(scope="module")
-def table() -> Table2D:
-    profile = built_in_profile("v", 10.0, 4.0)
-    return scratch_brdf_table(profile, bins=8, roughness=ROUGHNESS, rays=200)
+PROFILE = built_in_profile("v", 10.0, 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -49,21 +42,32 @@ def assert_same(one: Any, other: Any) -> None:
         assert np.asarray(a).dtype == np.asarray(b).dtype, name
 
 
-def test_a_table_comes_back(table: Table2D) -> None:
-    dataset = datasets.table_2d_dataset(table, "paths", ROUGHNESS)
-    stored = schemas.SCRATCH_TABLE_2D.conform(dataset)
-    assert stored.attrs["method"] == "paths"
+def test_the_papers_table_comes_back() -> None:
+    table = scratch_brdf_table(PROFILE, bins=8, method="paths", rays=200)
+    stored = schemas.SCRATCH_TABLE_2D.conform(datasets.paper_table_dataset(table, 1.4))
+    assert (stored.attrs["walls"], float(stored["index"])) == ("paper", 1.4)
     assert_same(datasets.table_2d_of(stored), table)
 
 
-def test_what_sampling_needs_comes_back(table: Table2D) -> None:
-    fresnel, lobe = fresnel_factors(8, 1.4, "physical"), make_lobe(table.across, ROUGHNESS)
-    plane = datasets.table_2d_dataset(table, "paths", ROUGHNESS)
-    dataset = datasets.table_dataset(table.rho, fresnel, lobe, 1.4)
-    stored = schemas.SCRATCH_TABLE.conform(dataset)
-    assert_same(datasets.fresnel_of(stored), fresnel)
-    assert_same(datasets.lobe_of(plane, stored), lobe)
-    np.testing.assert_allclose(stored["rho_s"][1], fresnel.factor[1][:, None] * table.rho)
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
+def test_a_table_of_glass_comes_back(roughness: float) -> None:
+    table = glass_table(PROFILE, bins=8, index=1.4, roughness=roughness, rays=200)
+    stored = schemas.SCRATCH_TABLE_2D.conform(datasets.glass_table_dataset(table))
+    assert stored.attrs["walls"] == "glass"
+    assert_same(datasets.table_2d_of(stored), table)
+
+
+def test_what_sampling_needs_comes_back() -> None:
+    """Of the paper's walls, which are put together with Fresnel's factor, and of walls of glass."""
+    papers = datasets.paper_table_dataset(scratch_brdf_table(PROFILE, bins=8), 1.4)
+    glass = datasets.glass_table_dataset(glass_table(PROFILE, bins=8, index=1.4))
+    for plane in (papers, glass):
+        table = datasets.bsdf_table_of(plane, "physical")
+        lobe = make_lobe(table)
+        stored = schemas.SCRATCH_TABLE.conform(datasets.table_dataset(table, lobe, "physical"))
+        again, sampler = datasets.scratch_tables_of(plane, stored)
+        assert_same(sampler, lobe)
+        assert_same(again, table._replace(rho=table.rho.astype(np.float32).astype(np.float64)))
 
 
 def test_layers_come_back_with_their_grid(layers: Layers) -> None:

@@ -18,14 +18,15 @@ from pipelines.drawing import colour
 from pipelines.geometry import solid_shapes
 from pipelines.glass_scratches.drawing import frames, live_parts, stage_view
 from pipelines.glass_scratches.layers import coverage, features, scratch_layers
-from pipelines.glass_scratches.tables import fresnel, profiles
+from pipelines.glass_scratches.tables import fresnel, glass_table, profiles, scratch_table
 from pipelines.glass_scratches.tables import lobe as lobes
-from pipelines.glass_scratches.tables import scratch_table as tables
-from pipelines.glass_scratches.tables.radiosity import equation_1, leaving_share
+from pipelines.glass_scratches.tables.radiosity import equation_1
 from storage.packages import encoding
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SETTING = {"setting": "setting-2"}
+PAPER = {"setting": "setting-1"}
+"""With the paper's walls."""
 PLATE = {"object": "plate"}
 KEYS = SETTING | PLATE
 TINY = {"size": 32, "samples": 2, "lights": 1, "moving_size": 32}
@@ -33,8 +34,9 @@ TINY = {"size": 32, "samples": 2, "lights": 1, "moving_size": 32}
 
 @pytest.fixture(scope="module")
 def good(house: Any) -> Any:
-    """The house with a diffuse and a mirror-like setting made once."""
-    house.launcher.launch(Request(SCRATCHES, [KEYS, {"setting": "mirror"}], preset="test"))
+    """The house with a diffuse and a clear setting made once, and one with the paper's walls."""
+    house.launcher.launch(Request(SCRATCHES, [KEYS, {"setting": "clear"}], preset="test"))
+    house.launcher.launch(Request(SCRATCHES, [PAPER], preset="test", given={"walls": "paper"}))
     return house
 
 
@@ -51,9 +53,9 @@ def test_every_asset_is_current_and_has_passed_every_check(good: Any) -> None:
         assert all(verdict["passed"] for verdict in verdicts.values())
 
 
-def test_the_table_is_the_papers_up_to_its_normalisation(good: Any) -> None:
+def test_the_papers_table_is_the_papers_up_to_its_normalisation(good: Any) -> None:
     """Eq. 1 counts rays: M / (N cos phi_o) each. All N that enter leave again."""
-    rho = _open(good, "scratch_table_2d", SETTING)["rho"].values
+    rho = _open(good, "scratch_table_2d", PAPER)["rho"].values[0]
     bins = len(rho)
     centres = (np.arange(bins) + 0.5) * np.pi / bins - np.pi / 2
     counted = equation_1(rho) * np.cos(centres)[:, None] / bins
@@ -61,18 +63,25 @@ def test_the_table_is_the_papers_up_to_its_normalisation(good: Any) -> None:
 
 
 def test_leans_are_those_of_the_paper(good: Any) -> None:
-    table = _open(good, "scratch_table", SETTING)
-    rho = _open(good, "scratch_table_2d", SETTING)["rho"].values
-    assert np.allclose(table["rho_s"].values[2], rho, rtol=1e-6)  # F(pi / 2) = 1
-    assert np.allclose(table["rho_s"].values[0], 0.04 * rho, rtol=1e-6)
-    assert np.allclose(table["gamma"].values, np.log(1 / 32) / np.log(2 / 3))
+    """At theta_o = 0 and pi / 2 by Eq. 2; between them by Eq. 3 and 4, gamma = 8.5476."""
+    table = _open(good, "scratch_table", PAPER)
+    rho = _open(good, "scratch_table_2d", PAPER)["rho"].values[0]
+    bins = len(rho)
+    reflected, leans = table["rho"].values[:, :bins, :bins], table["lean"].values
+    assert np.allclose(reflected[0], 0.04 * rho, rtol=1e-6)
+    assert np.allclose(reflected[-1], rho, rtol=1e-6)  # F(pi / 2) = 1
+    between = (2 * np.arcsin(leans[3]) / np.pi) ** 8.5476
+    assert np.allclose(reflected[3], (between + (1 - between) * 0.04) * rho, rtol=1e-4)
 
 
-def test_mirrors_lose_nothing_either(good: Any) -> None:
-    table = _open(good, "scratch_table_2d", {"setting": "mirror"})
-    assert table.attrs["method"] == "paths"
-    assert np.allclose(leaving_share(table["rho"].values), 1.0)
+def test_clear_walls_lose_nothing_and_keep_the_lean(good: Any) -> None:
+    table = _open(good, "scratch_table_2d", {"setting": "clear"})
+    assert table.attrs["keeps_lean"]
+    assert table.attrs["walls"] == "glass"
     assert (table["standard_error"].values > 0).any()
+    solved = _open(good, "scratch_table_2d", SETTING)
+    assert not solved.attrs["keeps_lean"]
+    assert (solved["standard_error"].values == 0).all()
 
 
 def test_frames_show_scratches_and_stay_below_a_uniform_environment(good: Any) -> None:
@@ -85,14 +94,14 @@ def test_frames_show_scratches_and_stay_below_a_uniform_environment(good: Any) -
 @pytest.mark.slow
 def test_the_overview_lays_settings_side_by_side(good: Any) -> None:
     store = good.workspace.store
-    good.launcher.launch(Request(SCRATCHES, [{"setting": "mirror"} | PLATE], "test", TINY))
+    good.launcher.launch(Request(SCRATCHES, [{"setting": "clear"} | PLATE], "test", TINY))
     good.launcher.launch(Request(SCRATCHES, [KEYS], "test", TINY))
     assert SCRATCHES.overview is not None
     pictures = SCRATCHES.overview(store, list(store.slots()))
     assert set(pictures) == {
         "plate-far",
         "plate-close",
-        "plate-diffuse-beside-specular",
+        "plate-diffuse-to-clear",
         "plate-moving-light",
     }
     assert pictures["plate-far"].shape == (32, 64, 3)
@@ -174,12 +183,12 @@ def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
 
 def _brighter_table(right: Callable[..., Any], *arguments: Any) -> Any:
     solved = right(*arguments)
-    return solved._replace(rho=solved.rho * 1.001)
+    return solved._replace(leaving=solved.leaving * 1.001)
 
 
-def _one_sided(right: Callable[..., Any], *arguments: Any) -> Any:
-    solved = right(*arguments)
-    return solved._replace(rho=solved.rho * np.linspace(0.99, 1.01, len(solved.rho)))
+def _one_sided(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    made = right(*arguments, **options)
+    return made._replace(rho=made.rho * np.linspace(0.99, 1.01, made.rho.shape[-1]))
 
 
 def _other_profile(right: Callable[..., Any], profile: Any, *arguments: Any) -> Any:
@@ -255,18 +264,19 @@ REGRESSIONS = (
     Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
     Regression("aspect", profiles, "cut_profile", _nanometres_as_micrometres, SETTING),
     Regression("opening_tilt", profiles, "cut_profile", _raised, SETTING),
-    Regression("furnace_error", tables, "solve_radiosity", _brighter_table, SETTING),
-    Regression("reciprocity_error", tables, "solve_radiosity", _one_sided, SETTING),
-    Regression("paths_z_rms", tables, "view_factors", _other_profile, SETTING),
+    Regression("energy_error", glass_table, "solve_glass", _brighter_table, SETTING),
+    Regression("reciprocity_error", glass_table, "glass_table", _one_sided, SETTING),
+    Regression("paths_z_rms", glass_table, "factors_of_both_sides", _other_profile, SETTING),
+    Regression("paths_z_rms", scratch_table, "view_factors", _other_profile, PAPER),
     Regression(
         "across_error",
-        tables,
-        "_across",
+        glass_table,
+        "_with_mean",
         lambda right, *arguments: right(*arguments) * np.float32(1.001),
         SETTING,
     ),
     Regression("sampler_p", lobes, "make_lobe", _skewed_sampler, SETTING),
-    Regression("interpolation_error", fresnel, "fresnel_factors", _other_exponent, SETTING),
+    Regression("interpolation_error", fresnel, "fresnel_factors", _other_exponent, PAPER),
     Regression("largest_share", lobes, "make_lobe", _generous_sampler, SETTING),
     Regression("coverage_error", scratch_layers, "make_layers", _wide_scratches, SETTING),
     Regression("map_z", coverage, "coverage_maps", _moved_map, SETTING),
@@ -329,13 +339,14 @@ def test_a_planted_regression_fails_its_check_and_the_last_good_version_stays(
     ("given", "sentence"),
     [
         ({"albedo": 1.2}, r"'albedo' is 1\.2; input should be less than or equal to 1"),
-        ({"refractive_index": 0.0}, r"'refractive_index' is 0\.0; input should be greater than 0"),
+        ({"refractive_index": 1.0}, r"'refractive_index' is 1\.0; input should be greater than 1"),
         ({"bins": 31}, r"'bins' is 31; input should be a multiple of 2"),
         ({"bins": 6}, r"'bins' is 6; input should be greater than or equal to 8"),
         ({"width": 0.0}, r"'width' is 0\.0; input should be greater than 0"),
         ({"profile_width": 0.0}, r"'profile_width' is 0\.0; input should be greater than 0"),
         ({"threshold": 0.7}, r"'threshold' is 0\.7; input should be less than or equal to 0\.5"),
         ({"roughness": 0.5, "method": "exact"}, r"roughness is 0\.5 with the method exact"),
+        ({"roughness": 0.5, "walls": "paper"}, r"roughness is 0\.5 with the paper's walls"),
         ({"resolution": 100}, r"resolution is 100; expected a power of two"),
         ({"shape": "u", "profile_depth": 8.0}, r"depth of the profile is 8; expected at most 5"),
         ({"environment": "moon"}, r"environment is 'moon'; expected room, lamps, sky, uniform"),
