@@ -198,20 +198,19 @@ def _measure(
     settings: MatrixSettings, scene_mesh: xr.Dataset, visibility: xr.Dataset
 ) -> Callable[[slice], NDArray[np.float32]]:
     """A function that measures the distances of a block of vertices."""
-    from pipelines.geometry.rays import build_scene
-    from pipelines.ssdf_lighting.distances.refined import refined_distances
+    from pipelines.ssdf_lighting.distances.refined import occluders, refined_distances
     from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
     from pipelines.ssdf_lighting.distances.visibility import RayOrigins
 
     scene, origins = scene_of(scene_mesh), ray_origins_of(visibility)
-    rays = build_scene(scene.vertices, scene.triangles)
+    around = occluders(scene.vertices, scene.triangles)
 
     def distances(block: slice) -> NDArray[np.float32]:
         seen = visible_of(visibility.isel(vertex=block))
         if settings.edges == "samples":
             return distances_to_samples(seen)
         some = RayOrigins(origins.points[block], origins.sealed[block])
-        return refined_distances(rays, some, scene.normals[block], seen)
+        return refined_distances(around, some, scene.normals[block], seen)
 
     return distances
 
