@@ -110,10 +110,8 @@ def _grown(
     after = np.zeros(most, np.int64)
     first, last = np.zeros(most, np.int64), np.zeros(most, np.int64)
     stack = np.empty((128, 2), np.int64)
-    depth, nodes = 0, 0
-    if count:
-        stack[0, 0], stack[0, 1] = 0, count
-        depth = 1
+    stack[0, 0], stack[0, 1] = 0, count
+    depth, nodes = 1, 0
     sizes = np.zeros(most, np.int64)  # edges below each node
     while depth:
         depth -= 1
@@ -193,8 +191,6 @@ def _reach(
             away = ends[edge, side] - middle
             farthest = max(farthest, (away * away).sum())
             normal = normals[edge, side]
-            if (normal * normal).sum() == 0.0:
-                least = -1.0
-            else:
-                least = min(least, (normal * axis).sum())
+            has_one = (normal * normal).sum() > 0.0
+            least = min(least, (normal * axis).sum()) if has_one else -1.0
     return math.sqrt(farthest), math.acos(max(min(least, 1.0), -1.0)) + 1e-6

@@ -1,0 +1,100 @@
+"""What distances say is open, looking up from the floor: a lamp post, wires and a leafy branch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.ssdf_thin_scenes import cylinder, leaf
+from pipelines.geometry import shapes
+from pipelines.geometry.rays import occluded
+from pipelines.ssdf_lighting.distances.octahedral import texel_directions
+from pipelines.ssdf_lighting.distances.refined import (
+    crossing_distances,
+    occluders,
+    refined_distances,
+)
+from pipelines.ssdf_lighting.distances.visibility import RayOrigins, visible_directions
+from pipelines.ssdf_lighting.thin_figures import said_open
+
+_PIXELS, _FINER = 380, 2
+_AT_ONCE = 8192
+_SKY, _DARK, _MARGIN = np.array([201, 219, 238]), np.array([38, 42, 48]), np.array([255, 255, 255])
+_HORIZON = 1.48
+"""Radians from straight up at the picture's rim: a little above the floor."""
+
+
+def thin_picture(n: int = 64) -> NDArray[np.uint8]:
+    """Side by side, as a fisheye lens sees the sky: by rays; what n x n directions and the edge
+    between them say is open; the same with the outlines (H, 3 W, 3)."""
+    vertices, triangles = _things()
+    around = occluders(vertices, triangles)
+    origins = RayOrigins(np.array([[0.0, 0.0, 1e-3]], np.float32), np.zeros(1, bool))
+    visible = visible_directions(around.rays, origins, texel_directions(n))
+    up = np.array([[0.0, 0.0, 1.0]])
+    ways, inside = _fisheye()
+    panels = [
+        ~occluded(around.rays, origins.points[0], ways),
+        _by(crossing_distances(around.rays, origins, up, visible)[0], ways),
+        _by(refined_distances(around, origins, up, visible)[0], ways),
+    ]
+    return np.hstack([_panel(is_open, inside) for is_open in panels])
+
+
+def _by(distances: NDArray[np.float32], ways: NDArray[np.float64]) -> NDArray[np.bool_]:
+    parts = np.array_split(ways, 1 + len(ways) // _AT_ONCE)
+    return np.concatenate([said_open(distances, some) for some in parts])
+
+
+def _fisheye() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Directions (inside, 3) of the pixels' samples, and which of all samples are inside."""
+    size = _PIXELS * _FINER
+    place = (np.arange(size) + 0.5) * (2.0 / size) - 1.0
+    x, y = np.meshgrid(place, -place)
+    radius = np.hypot(x, y)
+    inside = radius < 0.98
+    polar, turn = radius[inside] / 0.98 * _HORIZON, np.arctan2(y[inside], x[inside])
+    around = np.sin(polar)
+    return np.stack([around * np.cos(turn), around * np.sin(turn), np.cos(polar)], -1), inside
+
+
+def _panel(is_open: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    samples = np.broadcast_to(_MARGIN, (*inside.shape, 3)).astype(float)
+    samples[inside] = np.where(is_open[:, None], _SKY, _DARK)
+    pixels = samples.reshape(_PIXELS, _FINER, _PIXELS, _FINER, 3).mean(axis=(1, 3))
+    return np.rint(pixels).astype(np.uint8)
+
+
+def _things() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A floor, a lamp post with its arm and lamp, three wires, a branch with leaves."""
+    random = np.random.default_rng(5)
+    floor = shapes.square(4)
+    lamp = shapes.sphere(12)
+    foot, top = np.array([-2.0, 1.2, 0.0]), np.array([-2.0, 1.2, 3.2])
+    end = top + [0.9, -0.5, 0.15]
+    meshes = [
+        (8.0 * floor.vertices, floor.triangles),
+        cylinder(foot, top, 0.035),
+        cylinder(top, end, 0.02),
+        (0.11 * lamp.vertices * [1.3, 1.0, 0.5] + end, lamp.triangles),
+    ]
+    for shift in (0.0, 0.35, 0.6):
+        meshes.append(
+            cylinder(np.array([-5.0, -3.0 - shift, 3.4]), np.array([5.0, -1.6 - shift, 3.1]), 0.012)
+        )
+    branch = np.array([[4.2, 2.6, 2.2], [2.6, 2.0, 2.9], [1.5, 1.2, 3.0], [0.7, 0.9, 3.1]])
+    for k in range(3):
+        meshes.append(cylinder(branch[k], branch[k + 1], 0.05 - 0.013 * k))
+    for share in np.linspace(0.1, 1.0, 34):
+        k = min(2, math.floor(3 * share))
+        at = branch[k] + (branch[k + 1] - branch[k]) * (3 * share - k)
+        way = random.normal(size=3) * [1.0, 1.0, 0.5]
+        way /= np.linalg.norm(way)
+        stalk = at + 0.12 * way
+        meshes.append(cylinder(at, stalk, 0.006))
+        meshes.append(leaf(stalk, stalk + 0.26 * way, 0.1))
+    starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
+    corners = [faces + start for (_, faces), start in zip(meshes, starts[:-1], strict=True)]
+    return np.concatenate([points for points, _ in meshes]), np.concatenate(corners)
