@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,7 +69,6 @@ class Seen(NamedTuple):
 
 def thin_figures() -> dict[str, Any]:
     """All figures of this module."""
-    start = time.perf_counter()
     figures: dict[str, Any] = {
         name: {kind: {} for kind in KINDS}
         for name in ("thin_lost", "thin_lost_before", "thin_lost_by_directions", "thin_false")

@@ -70,8 +70,8 @@ def poles(degrees: float) -> ThinScene:
     random = np.random.default_rng(1)
     turn = (np.arange(COUNT) + random.random(COUNT)) * 2.0 * math.pi / COUNT
     feet = AWAY * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
-    lean = random.normal(size=(COUNT, 3)) * [0.4, 0.4, 0.2]
-    return _around(feet, feet + [0.0, 0.0, 4.0] + lean, degrees, cylinder, 0.5)
+    rise = np.array([0.0, 0.0, 4.0]) + random.normal(size=(COUNT, 3)) * [0.4, 0.4, 0.2]
+    return _around(feet, feet + rise, degrees, cylinder, 0.5)
 
 
 def wires(degrees: float) -> ThinScene:

@@ -73,7 +73,7 @@ def _things() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     floor = shapes.square(4)
     lamp = shapes.sphere(12)
     foot, top = np.array([-2.0, 1.2, 0.0]), np.array([-2.0, 1.2, 3.2])
-    end = top + [0.9, -0.5, 0.15]
+    end = top + np.array([0.9, -0.5, 0.15])
     meshes = [
         (8.0 * floor.vertices, floor.triangles),
         cylinder(foot, top, 0.035),

@@ -314,7 +314,7 @@ REGRESSIONS = (
     Regression("rmse", compact, "quantise_to_rmse", _asked_for(1.09), SCENE),
     Regression("byte_share", compact, "quantise_to_rmse", _asked_for(0.5), SCENE),
     Regression("wrong_visibility", Decoder, "distances", _raised, SCENE),
-    Regression("border_step", compact, "quantise_to_rmse", _uneven, SCENE),
+    Regression("seam_ratio", compact, "quantise_to_rmse", _uneven, SCENE),
     Regression("flux_error", environment_fit, "fit_lights", _bright, SKY),
     Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
