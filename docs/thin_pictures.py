@@ -72,7 +72,7 @@ def _things() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     random = np.random.default_rng(5)
     floor = shapes.square(4)
     lamp = shapes.sphere(12)
-    foot, top = np.array([-2.0, 1.2, 0.0]), np.array([-2.0, 1.2, 3.2])
+    foot, top = np.array([-2.2, 0.9, 0.0]), np.array([-2.2, 0.9, 3.2])
     end = top + np.array([0.9, -0.5, 0.15])
     meshes = [
         (8.0 * floor.vertices, floor.triangles),
@@ -80,21 +80,21 @@ def _things() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         cylinder(top, end, 0.02),
         (0.11 * lamp.vertices * [1.3, 1.0, 0.5] + end, lamp.triangles),
     ]
-    for shift in (0.0, 0.35, 0.6):
+    for shift in (0.0, 0.7, 1.6):
         meshes.append(
-            cylinder(np.array([-5.0, -3.0 - shift, 3.4]), np.array([5.0, -1.6 - shift, 3.1]), 0.012)
+            cylinder(np.array([-5.0, -1.9 - shift, 3.4]), np.array([5.0, -0.7 - shift, 3.1]), 0.012)
         )
-    branch = np.array([[4.2, 2.6, 2.2], [2.6, 2.0, 2.9], [1.5, 1.2, 3.0], [0.7, 0.9, 3.1]])
+    branch = np.array([[4.2, 3.4, 1.6], [2.6, 2.4, 2.2], [1.1, 1.7, 2.4], [-0.4, 1.4, 2.6]])
     for k in range(3):
         meshes.append(cylinder(branch[k], branch[k + 1], 0.05 - 0.013 * k))
-    for share in np.linspace(0.1, 1.0, 34):
+    for share in np.linspace(0.1, 1.0, 22):
         k = min(2, math.floor(3 * share))
         at = branch[k] + (branch[k + 1] - branch[k]) * (3 * share - k)
         way = random.normal(size=3) * [1.0, 1.0, 0.5]
         way /= np.linalg.norm(way)
-        stalk = at + 0.12 * way
+        stalk = at + 0.16 * way
         meshes.append(cylinder(at, stalk, 0.006))
-        meshes.append(leaf(stalk, stalk + 0.26 * way, 0.1))
+        meshes.append(leaf(stalk, stalk + 0.42 * way, 0.17))
     starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
     corners = [faces + start for (_, faces), start in zip(meshes, starts[:-1], strict=True)]
     return np.concatenate([points for points, _ in meshes]), np.concatenate(corners)
