@@ -267,7 +267,7 @@ def light_error(width: float) -> dict[str, dict[str, float]]:
             axis = places(seen, row)[pole, random.integers(PLACES // 4, PLACES)]
             axis = axis + random.normal(size=3) / math.sqrt(sharpness)
             axis /= np.linalg.norm(axis)
-            ways = _around_axis(random, axis, sharpness)
+            ways = drawn_directions(random, axis, sharpness)
             true = 1.0 - occluded(seen.around.rays, seen.origins.points[row], ways).mean()
             row_only, ask = np.array([row]), axis.astype(np.float32)[None, None]
             d = [float(matrix_along(one, row_only, ask)[0, 0]) for one in (seen.before, seen.after)]
@@ -282,7 +282,7 @@ def light_error(width: float) -> dict[str, dict[str, float]]:
     return found
 
 
-def _around_axis(random: np.random.Generator, axis: FloatArray, sharpness: float) -> FloatArray:
+def drawn_directions(random: np.random.Generator, axis: FloatArray, sharpness: float) -> FloatArray:
     """Directions (samples, 3) drawn from a spherical Gaussian."""
     uniform = random.random((SAMPLES, 1))
     cosine = 1.0 + np.log(uniform + (1.0 - uniform) * math.exp(-2.0 * sharpness)) / sharpness

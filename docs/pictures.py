@@ -24,7 +24,7 @@ from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from benchmarks.fur_oblique import oblique_pictures
 from docs.fur_pictures import close_and_against_the_light, fur_scene, in_wind
-from docs.thin_pictures import thin_picture
+from docs.thin_pictures import shadow_picture, thin_picture
 from pipelines.drawing.colour import to_8bit
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
@@ -112,6 +112,7 @@ def _lighting(store: VersionedStore) -> None:
             FOLDER / name, optimize=True
         )
     Image.fromarray(thin_picture()).save(FOLDER / "ssdf-thin.png", optimize=True)
+    Image.fromarray(shadow_picture()).save(FOLDER / "ssdf-thin-shadows.png", optimize=True)
     result = json.loads((Path("benchmarks") / "results" / "ssdf.json").read_text())
     curve = Image.fromarray(rate_distortion_picture(result["curve"]))
     curve.save(FOLDER / "ssdf-curve.png", optimize=True)
