@@ -46,7 +46,7 @@ def seam_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     shared = shared_basis_of(stored("triangle_clusters"))
     one = compact.quantise_to_rmse(shared, np.zeros(len(matrix), np.int32), rmse)
     offset = np.random.default_rng(0).normal(size=int(cluster.max()) + 1) * rmse
-    codings = {
+    codings: dict[str, DistancesAlong] = {
         "seam_ratio": decoder.distances_along,
         "seam_ratio_single_pca": Decoder.of_file(to_bytes(one)).distances_along,
         "seam_ratio_null": functools.partial(_offset, decoder, offset.astype(np.float32)),

@@ -212,14 +212,12 @@ def compressed(width: float) -> dict[str, float]:
     decoded, size = _compressed(seen.after, triangles)
     _, size_before = _compressed(seen.before, triangles)
     some = np.random.default_rng(0).permutation(len(seen.rows))[:VERTICES]
-    sample = seen._replace(
-        rows=seen.rows[some], origins=RayOrigins(*(part[some] for part in seen.origins))
-    )
+    sample = seen._replace(rows=seen.rows[some], origins=_rows(seen.origins, some))
     numbers = np.arange(len(some))
-    ways = np.stack([places(sample, row).reshape(-1, 3) for row in numbers]).astype(np.float32)
+    ways = np.stack([places(sample, row).reshape(-1, 3) for row in range(len(some))])
     bare = _without_poles(seen, some)
     without, exact, found = (
-        matrix_along(np.ascontiguousarray(d), numbers, ways)
+        matrix_along(np.ascontiguousarray(d), numbers, ways.astype(np.float32))
         for d in (bare, seen.after[some], decoded[some])
     )
     change = without - exact
@@ -244,11 +242,15 @@ def _compressed(matrix: Floats, triangles: NDArray[np.int64]) -> tuple[Floats, i
     return Decoder.of_file(file).distances(np.arange(len(matrix))), len(file)
 
 
+def _rows(origins: RayOrigins, some: NDArray[np.int64]) -> RayOrigins:
+    return RayOrigins(origins.points[some], origins.sealed[some])
+
+
 def _without_poles(seen: Seen, some: NDArray[np.int64]) -> Floats:
     """Distances of the same vertices where the floor is alone."""
     scene = seen.thin.scene
     alone = occluders(scene.vertices, scene.triangles[scene.part == 0])
-    origins = RayOrigins(*(part[some] for part in seen.origins))
+    origins = _rows(seen.origins, some)
     visible = visible_directions(alone.rays, origins, texel_directions(N))
     return refined_distances(alone, origins, scene.normals[seen.rows[some]], visible)
 
