@@ -74,7 +74,7 @@ def shadow_picture(sharpness: float = 300.0) -> NDArray[np.uint8]:
     ):
         d = matrix_along(distances, np.arange(len(points)), axes)[:, 0]
         panels.append(visible_integral(d, sharpness) / integral(sharpness))
-    grey = [np.pad(panel.reshape(x.shape), 1, constant_values=1.0) for panel in panels]
+    grey = [np.pad(0.45 * panel.reshape(x.shape), 1, constant_values=1.0) for panel in panels]
     wide = to_8bit(np.hstack(grey)[..., None].repeat(3, axis=-1))
     return wide.repeat(_PIXELS // len(x), axis=0).repeat(_PIXELS // len(x), axis=1)
 
