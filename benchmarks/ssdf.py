@@ -25,6 +25,8 @@ from assets_defs.ssdf_lighting.graph import SSDF
 from assets_defs.workspace import CHECKOUT, Workspace
 from benchmarks.ssdf_distances import edge_figures, slit_figures
 from benchmarks.ssdf_precompute import SCENE
+from benchmarks.ssdf_seams import seam_figures
+from benchmarks.ssdf_thin import thin_figures
 from pipelines.ssdf_lighting.compression import compact as coding
 from pipelines.ssdf_lighting.compression.clustered_pca import ClusteredPca, clustered_pca
 from pipelines.ssdf_lighting.compression.compact_file import to_bytes
@@ -70,6 +72,8 @@ def run(scale: str) -> dict[str, Any]:
         _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
         _timed(figures, "edges", lambda: edge_figures(stored))
         figures |= slit_figures()
+        _timed(figures, "seams", lambda: seam_figures(stored))
+        _timed(figures, "thin", thin_figures)
         from benchmarks.ssdf_pictures import picture_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))

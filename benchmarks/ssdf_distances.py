@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from assets_defs.ssdf_lighting.datasets import scene_of, visible_of
-from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.distances.refined import refined_distances
+from pipelines.ssdf_lighting.distances.refined import occluders, refined_distances
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
 from pipelines.ssdf_lighting.distances.visibility import RayOrigins, visible_directions
 from pipelines.ssdf_lighting.light.spherical_gaussians import integral, visible_integral
@@ -26,7 +25,7 @@ NAIVE_VERTICES, FINE_VERTICES, FINE = 500, 250, 384
 def edge_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """The edge inside a cell against many more directions; speed against all pairs."""
     scene, seen = scene_of(stored("scene_mesh")), stored("visibility")
-    rays = build_scene(scene.vertices, scene.triangles)
+    around = occluders(scene.vertices, scene.triangles)
     random = np.random.default_rng(0)
     origins = seen["origin"].values
 
@@ -42,7 +41,7 @@ def edge_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
 
     def refined(of: NDArray[np.int64], visible: NDArray[np.bool_]) -> NDArray[np.float32]:
         return refined_distances(
-            rays, RayOrigins(origins[of], sealed[of]), scene.normals[of], visible
+            around, RayOrigins(origins[of], sealed[of]), scene.normals[of], visible
         )
 
     refined(rows[:8], visible[:8])
@@ -64,7 +63,7 @@ def edge_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     squares = []
     for row, vertex in enumerate(fine):
         some = RayOrigins(origins[vertex : vertex + 1], np.zeros(1, bool))
-        there = visible_directions(rays, some, many)[0]
+        there = visible_directions(around.rays, some, many)[0]
         if there.all() or not there.any():
             continue
         exact = np.where(

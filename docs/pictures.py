@@ -27,6 +27,7 @@ from assets_defs.system import System
 from assets_defs.workspace import Workspace
 from benchmarks.fur_oblique import oblique_pictures
 from docs.fur_pictures import close_and_against_the_light, fur_scene, in_wind
+from docs.thin_pictures import shadow_picture, thin_picture
 from pipelines.drawing.colour import to_8bit
 from pipelines.glass_scratches.drawing.frames import picture_exposure
 from pipelines.light.room import room
@@ -114,6 +115,8 @@ def _lighting(store: VersionedStore) -> None:
         Image.fromarray(_shown(store, SSDF, asset, {"scene": "teapot"}, picture)).save(
             FOLDER / name, optimize=True
         )
+    Image.fromarray(thin_picture()).save(FOLDER / "ssdf-thin.png", optimize=True)
+    Image.fromarray(shadow_picture()).save(FOLDER / "ssdf-thin-shadows.png", optimize=True)
     result = json.loads((Path("benchmarks") / "results" / "ssdf.json").read_text())
     curve = Image.fromarray(rate_distortion_picture(result["curve"]))
     curve.save(FOLDER / "ssdf-curve.png", optimize=True)

@@ -118,12 +118,12 @@ def _wrong_visibility(version: StoredVersion) -> float:
     return float(version.dataset["wrong_visibility"])
 
 
-def _border_step(version: StoredVersion) -> float:
-    """Steps of the error across borders of clusters over those inside, some directions."""
+def _seam_ratio(version: StoredVersion) -> float:
+    """Steps of the error across borders of clusters over those beside them, some directions."""
     decoder, blocks = decoder_of(version.dataset), distance_blocks(version.input("ssdf_matrix"))
     errors = figures.errors_along_axes(blocks, decoder.distances_along)
     triangles = version.input("scene_mesh")["triangles"].values
-    return figures.border_step(errors, triangles, decoder.tables.cluster)
+    return figures.seam_ratio(errors, triangles, decoder.tables.cluster)
 
 
 def _basis_pictures(dataset: xr.Dataset) -> Pictures:
@@ -169,10 +169,10 @@ def _basis_pictures(dataset: xr.Dataset) -> Pictures:
             change=0.001,
         ),
         Check(
-            "border_step",
-            "Steps of the error across borders of clusters, over those inside.",
-            _border_step,
-            at_most=4.0,
+            "seam_ratio",
+            "Steps of the error across borders of clusters, over those beside: 1 is invisible.",
+            _seam_ratio,
+            at_most=2.0,
             change=0.1,
         ),
     ),

@@ -18,7 +18,7 @@ from assets_defs.ssdf_lighting.datasets import (
 )
 from assets_defs.ssdf_lighting.declaration import SSDF
 from assets_defs.system import Pictures, Progress, Result
-from pipelines.ssdf_lighting import figures
+from pipelines.ssdf_lighting import figures, thin_figures
 from pipelines.ssdf_lighting.distances.octahedral import resolution_of
 from storage.schemas import ssdf_lighting as schemas
 from storage.stored_version import StoredVersion
@@ -144,6 +144,31 @@ def _distance_error(version: StoredVersion) -> float:
     )
 
 
+def _missed_share(version: StoredVersion) -> float:
+    if version.record["settings"]["edges"] == "samples":
+        return 0.0  # by their definition they know nothing of what is between the directions
+    return thin_figures.missed_share(*_sampled_distances(version))
+
+
+def _made_up_share(version: StoredVersion) -> float:
+    return thin_figures.made_up_share(*_sampled_distances(version))
+
+
+def _sampled_distances(
+    version: StoredVersion,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64], NDArray[np.integer]]:
+    """Distances and origins of sampled vertices that are not sealed; the mesh."""
+    seen, mesh = version.input("visibility"), version.input("scene_mesh")
+    rows = figures.sampled_rows(seen.sizes["vertex"], 48)
+    rows = rows[~seen["sealed"].values[rows]]
+    return (
+        version.dataset["distances"].isel(vertex=rows).values,
+        seen["origin"].values[rows],
+        mesh["vertices"].values,
+        mesh["triangles"].values,
+    )
+
+
 def _sign_error(version: StoredVersion) -> float:
     distances, seen = version.dataset["distances"], version.input("visibility")
     return figures.sign_error(
@@ -166,7 +191,7 @@ def _blocks(count: int) -> Iterator[slice]:
         Check(
             "distance_error",
             "On sampled vertices, against all pairs of directions: the largest difference "
-            "(samples), or how far beyond what the cells allow (refined), rad.",
+            "(samples), or how far beyond them (refined), rad.",
             _distance_error,
             at_most=1e-5,
         ),
@@ -175,6 +200,19 @@ def _blocks(count: int) -> Iterator[slice]:
             "Share of the distances whose sign is not that of the visibility.",
             _sign_error,
             at_most=0.0,
+        ),
+        Check(
+            "missed_share",
+            "Share of sampled points of the mesh that lie where d says that the sky is open "
+            "(refined).",
+            _missed_share,
+            at_most=0.003,
+        ),
+        Check(
+            "made_up_share",
+            "Share of sampled open directions around which, a little farther than d, nothing is.",
+            _made_up_share,
+            at_most=0.02,
         ),
     ),
 )
@@ -198,20 +236,19 @@ def _measure(
     settings: MatrixSettings, scene_mesh: xr.Dataset, visibility: xr.Dataset
 ) -> Callable[[slice], NDArray[np.float32]]:
     """A function that measures the distances of a block of vertices."""
-    from pipelines.geometry.rays import build_scene
-    from pipelines.ssdf_lighting.distances.refined import refined_distances
+    from pipelines.ssdf_lighting.distances.refined import occluders, refined_distances
     from pipelines.ssdf_lighting.distances.signed_distance import distances_to_samples
     from pipelines.ssdf_lighting.distances.visibility import RayOrigins
 
     scene, origins = scene_of(scene_mesh), ray_origins_of(visibility)
-    rays = build_scene(scene.vertices, scene.triangles)
+    around = occluders(scene.vertices, scene.triangles)
 
     def distances(block: slice) -> NDArray[np.float32]:
         seen = visible_of(visibility.isel(vertex=block))
         if settings.edges == "samples":
             return distances_to_samples(seen)
         some = RayOrigins(origins.points[block], origins.sealed[block])
-        return refined_distances(rays, some, scene.normals[block], seen)
+        return refined_distances(around, some, scene.normals[block], seen)
 
     return distances
 

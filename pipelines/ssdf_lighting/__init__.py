@@ -6,7 +6,8 @@ order of the method:
 1. ``scene``: what is lit, repaired and of a size of its own (``built_in_scene``, ``make_scene``).
 2. ``distances``: which directions of the octahedral map (``octahedral``) a vertex sees the sky in
    (``visibility``), and how far each is from the edge of the sky (``visible_edge``,
-   ``signed_distance``, ``refined``: ``scene_distances``); ``edge_share`` is for shaders.
+   ``thin_parts``, ``signed_distance``, ``refined``: ``scene_distances``); ``edge_share`` is for
+   shaders.
 3. ``compression``: a basis of the scene (``shared_basis``), clusters (``triangle_clusters``), few
    bits in them (``compact``, ``compact_file``, ``compact_memory``) or the paper's vectors
    (``clustered_pca``); ``decoder`` gives distances back.
@@ -14,5 +15,5 @@ order of the method:
    glossy part of a surface make of them (``cosine_lobes``, ``gloss_lobes``, ``shading``).
 5. ``drawing``: the scene under turning light on the stage, and traced (``frames``).
 
-``figures`` tells whether results are right.
+``figures`` and ``thin_figures`` tell whether results are right.
 """

@@ -13,7 +13,6 @@ from pipelines.drawing.colour import decode_srgb
 from pipelines.geometry.mesh_edges import edge_vertices
 from pipelines.ssdf_lighting.distances.octahedral import (
     NO_EDGE,
-    delaunay_sides,
     resolution_of,
     solid_angles,
     texel_directions,
@@ -135,20 +134,15 @@ def distance_error(
     """Largest error of d (P, D), radians, by all pairs.
 
     Distances to samples must be equal. Those to the refined edge lie below, for a path to a
-    sample of the other visibility crosses the edge; and where the sky is visible by at most the
-    longest side of a Delaunay triangle, for that far behind the edge there is a sample. (Hidden
-    directions may be near a hole between the samples.)
+    sample of the other visibility crosses the edge. How far below is not for samples to say:
+    between them there may be holes and thin parts (see `thin_figures`).
     """
     exact = all_pairs_distances(visible)
     if not refined:
         return float(np.abs(distances - exact).max())
-    n = resolution_of(visible.shape[1])
-    ends = texel_directions(n)[delaunay_sides(n).ends]
-    longest = 2.0 * np.arcsin(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max() / 2.0)
     over = np.abs(distances) - np.abs(exact)
-    under = np.where(visible, exact - longest - distances, 0.0)
     flipped = np.where(np.sign(distances) == np.sign(exact), 0.0, np.abs(exact))
-    return float(max(over.max(), under.max(), flipped.max(), 0.0))
+    return float(max(over.max(), flipped.max(), 0.0))
 
 
 def sign_error(
@@ -246,22 +240,32 @@ def errors_along_axes(
     return np.concatenate(errors)
 
 
-def border_step(
-    errors: NDArray[np.float32],
+def seam_ratio(
+    errors: NDArray[np.floating],
     triangles: NDArray[np.integer],
     cluster: NDArray[np.integer],
 ) -> float:
-    """How much more the error of d steps along edges between clusters than inside them.
+    """How much borders between clusters stand out: 1 is not at all.
 
-    errors (V, D), or any sample of vertices' directions: found minus true. Ratio of the RMS
-    difference over edges with ends in two clusters and edges with both in one; 1 is no step.
+    errors (V, S): found minus true, of whatever is seen at vertices in S samples (distances, or
+    brightness under S lights). Mean step of the error over the edges between two clusters, over
+    that of the edges that touch such a border and do not cross it: those are in the same places,
+    of the same length and in the same light. 1 where there are no borders, or nothing else.
+
+    >>> strip = np.array([[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]])
+    >>> errors = np.array([[0.0], [0.1], [0.1], [0.5], [0.4], [0.4]])
+    >>> round(seam_ratio(errors, strip, np.arange(6) // 3), 6)
+    5.5
     """
     edges = edge_vertices(triangles)
-    between = cluster[edges[:, 0]] != cluster[edges[:, 1]]
-    if between.all() or not between.any():
+    across = cluster[edges[:, 0]] != cluster[edges[:, 1]]
+    at_border = np.zeros(len(cluster), bool)
+    at_border[edges[across]] = True
+    beside = ~across & at_border[edges].any(axis=1)
+    if not across.any() or not beside.any():
         return 1.0
-    steps = ((errors[edges[:, 0]] - errors[edges[:, 1]]).astype(np.float64) ** 2).mean(axis=1)
-    return float(np.sqrt(steps[between].mean() / max(steps[~between].mean(), 1e-300)))
+    steps = np.abs(errors[edges[:, 0]].astype(np.float64) - errors[edges[:, 1]]).mean(axis=1)
+    return float(steps[across].mean() / max(steps[beside].mean(), 1e-300))
 
 
 # ---- pictures ----------------------------------------------------------------------------------

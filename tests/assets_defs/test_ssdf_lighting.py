@@ -211,6 +211,16 @@ def _unsigned(right: Callable[..., Any], *arguments: Any) -> Any:
     return np.abs(right(*arguments))
 
 
+def _without_thin_parts(right: Callable[..., Any], *arguments: Any) -> Any:
+    found = right(*arguments)
+    return found._replace(starts=0 * found.starts)
+
+
+def _elsewhere(right: Callable[..., Any], *arguments: Any) -> Any:
+    found = right(*arguments)
+    return found._replace(crossings=-found.crossings)
+
+
 def _gaps(right: Callable[..., Any], *arguments: Any) -> Any:
     made = right(*arguments)
     return made._replace(triangle=made.triangle * 2)
@@ -294,6 +304,8 @@ REGRESSIONS = (
     Regression("visible_share", visibility, "visible_directions", _leaking, SCENE),
     Regression("distance_error", refined, "distances_to_arcs", _longer, SCENE),
     Regression("sign_error", refined, "refined_distances", _unsigned, SCENE),
+    Regression("missed_share", refined, "thin_outlines", _without_thin_parts, SCENE),
+    Regression("made_up_share", refined, "thin_outlines", _elsewhere, SCENE),
     Regression("unused", triangle_clusters, "clusters_by_distance", _gaps, SCENE),
     Regression("compactness", triangle_clusters, "clusters_by_distance", _shuffled, SCENE),
     Regression("basis_error", shared_basis, "right_singular_vectors", _shrunk, SCENE),
@@ -302,7 +314,7 @@ REGRESSIONS = (
     Regression("rmse", compact, "quantise_to_rmse", _asked_for(1.09), SCENE),
     Regression("byte_share", compact, "quantise_to_rmse", _asked_for(0.5), SCENE),
     Regression("wrong_visibility", Decoder, "distances", _raised, SCENE),
-    Regression("border_step", compact, "quantise_to_rmse", _uneven, SCENE),
+    Regression("seam_ratio", compact, "quantise_to_rmse", _uneven, SCENE),
     Regression("flux_error", environment_fit, "fit_lights", _bright, SKY),
     Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),

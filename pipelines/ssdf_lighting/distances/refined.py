@@ -1,17 +1,16 @@
-"""Distances to the refined edge of visibility, small holes included.
+"""Distances to the refined edge of visibility, small holes and thin parts included.
 
-Directions miss what is smaller than their texels: a gap between two surfaces, or between facets at
-the surface's own horizon, through which a little sky shows. That is rare, but distances are then
-wrong over a wide dark region. So inside dark regions every texel is asked again, at four places; a
-place that sees the sky gets a small loop of its own. (Thin stems before the sky are missed the same
-way. To ask all bright texels again, too, took a third more time and gained next to nothing on the
-teapot.)
+Directions miss what is smaller than their texels. A gap between two surfaces, or between facets at
+the surface's own horizon, through which a little sky shows, is rare, but distances are then wrong
+over a wide dark region. So inside dark regions every texel is asked again, at four places; a place
+that sees the sky gets a small loop of its own. What is thin before the sky (poles, wires, leaves)
+is found by the mesh's own edges instead: see `thin_parts`.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,7 +23,9 @@ from pipelines.ssdf_lighting.distances.octahedral import (
     square_of,
     texel_directions,
 )
+from pipelines.ssdf_lighting.distances.outline_tree import OutlineTree, outline_tree
 from pipelines.ssdf_lighting.distances.signed_distance import distances_to_arcs
+from pipelines.ssdf_lighting.distances.thin_parts import thin_outlines
 from pipelines.ssdf_lighting.distances.visibility import RayOrigins, scene_visibility, unpacked
 from pipelines.ssdf_lighting.distances.visible_edge import VisibleEdge, visible_edge
 
@@ -37,8 +38,20 @@ _LOOP = 0.2
 """Radius of the loop around a hole, in sides of a texel."""
 
 
+class Occluders(NamedTuple):
+    """What hides the sky: for rays, and its edges that can be outline."""
+
+    rays: RaycastingScene
+    outlines: OutlineTree
+
+
+def occluders(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> Occluders:
+    """Of a mesh: vertices (V, 3), triangles (F, 3). Raises ValueError as `rays.build_scene`."""
+    return Occluders(build_scene(vertices, triangles), outline_tree(vertices, triangles))
+
+
 def refined_distances(
-    scene: RaycastingScene,
+    around: Occluders,
     origins: RayOrigins,
     normals: NDArray[np.floating],
     visible: NDArray[np.bool_],
@@ -46,10 +59,29 @@ def refined_distances(
     """d (P, n²) float32, radians, of P points whose ``visible`` (P, n²) is known.
 
     ``normals`` (P, 3): far below the surface's own horizon no holes are looked for. The signs are
-    those of ``visible``.
+    those of ``visible``; where thin parts stand between the directions, d is the angle to them.
     """
-    edge = visible_edge(scene, origins.points, visible)
-    point, way = _holes(scene, origins, normals, visible)
+    distances = crossing_distances(around.rays, origins, normals, visible)
+    thin = thin_outlines(origins.points, distances, around.outlines)
+    some = np.flatnonzero(np.diff(thin.starts))
+    if len(some):
+        starts = np.append(thin.starts[some], thin.starts[-1])
+        seen = visible[some]
+        to_thin = distances_to_arcs(seen, thin._replace(starts=starts))
+        distances[some] = np.where(seen, np.minimum(distances[some], to_thin), distances[some])
+    return distances
+
+
+def crossing_distances(
+    rays: RaycastingScene,
+    origins: RayOrigins,
+    normals: NDArray[np.floating],
+    visible: NDArray[np.bool_],
+) -> NDArray[np.float32]:
+    """The same without thin parts: to where the edge crosses between two directions of different
+    visibility, and to holes in the dark."""
+    edge = visible_edge(rays, origins.points, visible)
+    point, way = _holes(rays, origins, normals, visible)
     return distances_to_arcs(visible, _with_loops(edge, point, way, visible.shape[1]))
 
 
@@ -65,7 +97,7 @@ def scene_distances(
     """
     seen = scene_visibility(vertices, triangles, normals, n)
     visible = unpacked(seen.visible, n * n)
-    return refined_distances(build_scene(vertices, triangles), seen.origins, normals, visible)
+    return refined_distances(occluders(vertices, triangles), seen.origins, normals, visible)
 
 
 @functools.lru_cache(maxsize=4)
