@@ -31,6 +31,7 @@ STEEPEST = 0.6
 _FINE = 16
 _CLOSED = 1e-13
 _ROUNDS = 10_000
+_FITS = 20
 
 
 def glass_table(
@@ -104,7 +105,7 @@ def _even_table(
         rho[None],
         np.zeros((1, *rho.shape)),
         solved.kept[None],
-        _with_mean(across, rho)[None],
+        _with_mean(across, rho, weights)[None],
         np.zeros(1),
         False,
         index,
@@ -128,7 +129,7 @@ def table_of_glass_paths(
     rho = np.where(np.outer(shot, shot), (counted + counted.T) / 2, 0.0)
     rho = _closed(rho, weights, np.where(shot, 1.0 - kept, 0.0))
     across = paths.leaving.transpose(1, 0, 2) * (PLACES / paths.rays) / weights
-    return rho, np.sqrt(variance + variance.T) / 2, kept, _with_mean(across, rho)
+    return rho, np.sqrt(variance + variance.T) / 2, kept, _with_mean(across, rho, weights)
 
 
 def _closed(
@@ -149,9 +150,20 @@ def _closed(
     return closed
 
 
-def _with_mean(across: NDArray[np.float64], rho: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Tables of places (P, 2 M view, 2 M light), scaled so that their mean is exactly rho."""
-    mean = across.mean(axis=0)
-    scale = np.divide(rho, mean, out=np.zeros_like(rho), where=mean > 0)
+def _with_mean(
+    across: NDArray[np.float64], rho: NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Tables of places (P, 2 M view, 2 M light), scaled so that their mean is exactly rho, and that
+    a view's beam leaves by its share from each place, as nearly as both can be.
+
+    Places and lights are scaled in turns (iterative proportional fitting).
+    """
     # Where no path of this direction was counted, but one of the other was, no place is known.
-    return np.where(mean > 0, across * scale, rho).astype(np.float32)
+    fitted = np.where(across.mean(axis=0) > 0, across, rho)
+    shares = across @ weights
+    for _ in range(_FITS):
+        sums = fitted @ weights
+        fitted *= np.divide(shares, sums, out=np.zeros_like(sums), where=sums > 0)[..., None]
+        mean = fitted.mean(axis=0)
+        fitted *= np.divide(rho, mean, out=np.zeros_like(rho), where=mean > 0)
+    return fitted.astype(np.float32)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,11 +13,13 @@ from pipelines.glass_scratches.layers.coverage import coverage_maps
 from pipelines.glass_scratches.layers.scratch_layers import make_layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
 from pipelines.glass_scratches.tables.bins import bin_weights
+from pipelines.glass_scratches.tables.glass_table import glass_table
 from pipelines.glass_scratches.tables.profiles import built_in_profile
 from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
 from pipelines.glass_scratches.tables.table_2d import Table2D
 
 BINS = 16
+PROFILE = built_in_profile("v", 10.0, 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -37,10 +41,31 @@ def test_depth_over_width_and_what_lies_off_the_opening() -> None:
 
 
 def test_light_that_neither_leaves_nor_stays_is_found(table: Table2D) -> None:
-    assert figures.table_furnace_error(table.rho, table.absorbed) < 1e-12
+    assert figures.energy_error(table) < 1e-12
     lost = table.absorbed.copy()
     lost[3] -= 0.01
-    assert figures.table_furnace_error(table.rho, lost) == pytest.approx(0.01)
+    assert figures.energy_error(table._replace(absorbed=lost)) == pytest.approx(0.01)
+
+
+def test_a_table_of_glass_that_loses_light_or_has_sides_is_found() -> None:
+    glass = glass_table(PROFILE, bins=8, index=1.5, facets=20)
+    assert figures.energy_error(glass) < 1e-11
+    assert figures.reciprocity_error(glass) == 0.0
+    darker = glass._replace(rho=0.99 * glass.rho)
+    assert figures.energy_error(darker) == pytest.approx(0.01, rel=1e-6)
+    tilted = glass._replace(rho=glass.rho * np.linspace(0.95, 1.05, 16))
+    assert figures.reciprocity_error(tilted) > 0.01
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.5, 1.0])
+def test_new_paths_find_the_table_and_no_other(roughness: float) -> None:
+    """RMS z of some 400 blocks: about one, and far off for the table of a deeper scratch."""
+    walls = {"albedo": 1.0, "roughness": roughness}
+    options: dict[str, Any] = {"bins": 16, "index": 1.5, "roughness": roughness, "rays": 20_000}
+    right = glass_table(PROFILE, **options)
+    assert figures.paths_z_rms(PROFILE, right, **walls) < 1.3
+    other = glass_table(PROFILE * [1.0, 1.6], **options)
+    assert figures.paths_z_rms(PROFILE, other, **walls) > 5
 
 
 def test_block_means_are_weighted_by_the_cosines() -> None:
@@ -52,19 +77,21 @@ def test_block_means_are_weighted_by_the_cosines() -> None:
 
 
 def test_a_one_sided_table_is_found_beyond_its_noise(table: Table2D) -> None:
-    none = np.zeros_like(table.rho)
-    assert figures.reciprocity_error(table.rho, none) < 1e-12
-    tilted = table.rho * np.linspace(0.95, 1.05, BINS)
-    assert figures.reciprocity_error(tilted, none) > 0.01
-    assert figures.reciprocity_error(tilted, np.full_like(none, 0.1)) == 0.0
+    assert figures.reciprocity_error(table) < 1e-12
+    tilted = table._replace(rho=table.rho * np.linspace(0.95, 1.05, BINS))
+    assert figures.reciprocity_error(tilted) > 0.01
+    noisy = tilted._replace(standard_error=np.full_like(table.rho, 0.1))
+    assert figures.reciprocity_error(noisy) == 0.0
 
 
 def test_the_mean_across_the_opening_is_the_table(table: Table2D) -> None:
-    assert figures.across_error(table.across, table.rho) < 1e-6
+    assert figures.across_error(table.across[None], table.rho[None]) < 1e-6
     brighter = table.across.copy()
     brighter[:, 2, 5] *= 1.1
     expected = 0.1 * table.rho[5, 2] / table.rho.max()
-    assert figures.across_error(brighter, table.rho) == pytest.approx(expected, rel=1e-4)
+    assert figures.across_error(brighter[None], table.rho[None]) == pytest.approx(
+        expected, rel=1e-4
+    )
 
 
 # ---- layers ------------------------------------------------------------------------------------
