@@ -35,8 +35,8 @@ def denoised(picture: TracedPicture) -> NDArray[np.float32]:
     >>> grey = np.full((32, 32, 3), 0.5, np.float32)
     >>> none = np.zeros((32, 32), np.float32)
     >>> traced = TracedPicture(grey, none, none, grey, np.zeros_like(grey), 0, 16)
-    >>> bool(np.allclose(denoised(traced), 0.5, atol=0.02))
-    True
+    >>> round(float(denoised(traced).mean()), 2)
+    0.5
     """
     from pyoidn import denoise
 
