@@ -1,7 +1,7 @@
 """Figures of the pictures: what the denoiser makes of 64 paths a pixel, beside many.
 
 At the paper's scale pictures have 180 x 180 pixels and references 4096 paths a pixel: the better
-part of an hour. Else they have 64 x 64 and 1024, and the figures' names end in ``_small``: a
+part of an hour. Else they have 80 x 80 and 1024, and the figures' names end in ``_small``: a
 denoiser has less to go by, the fewer pixels a thing has.
 """
 
@@ -25,10 +25,10 @@ from pipelines.light.environment_sampling import EnvironmentSampler, make_enviro
 from pipelines.light.room import room
 
 SAMPLES = 64
-SIZES = {"default": (64, 1024), "paper": (180, 4096)}
+SIZES = {"default": (80, 1024), "paper": (180, 4096)}
 """Pixels a side, paths a pixel of the reference."""
 CLEAN_SIZES = {"default": 128, "paper": 512}
-SCRATCHED, UNSCRATCHED = 0.5, 0.1
+SCRATCHED, UNSCRATCHED = 0.5, 0.2
 """Shares of paths that meet a scratch: a pixel with more than the one shows scratches, with less
 than the other none."""
 _NEIGHBOURS = 11
@@ -139,10 +139,12 @@ def contrast_kept(one: Judged, way: str) -> float:
     unscratched ones around them, projected onto how far those of the reference do.
 
     Noise that is no part of the reference leaves it as it is, on average; what is blurred has less
-    than 1.
+    than 1. Raises ValueError where no pixel is scratched among unscratched ones.
     """
     pictures = getattr(one, way), one.reference
     found, wanted = (_standing_out(each, one.scratched) for each in pictures)
+    if not len(wanted):
+        raise ValueError("no pixel shows scratches among some that do not; expected a closer view.")
     return float((found * wanted).sum() / (wanted * wanted).sum())
 
 

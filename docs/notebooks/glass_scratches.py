@@ -7,7 +7,6 @@
 # %%
 import matplotlib.pyplot as plt
 
-from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches import scratched_glass as glass
 from pipelines.glass_scratches.drawing import denoising, frames
@@ -30,5 +29,5 @@ pane = glass.scratched_glass(plate(1.5, 1.1, 0.05), glass.scratch_material(table
 light = environment_sampling.make_environment_sampler(room.room(512))
 traced = frames.trace_view(pane, light, frames.object_cameras(pane.solid)[1], size=180, samples=16)
 clean = denoising.denoised(traced)
-plt.imshow(to_8bit(clean * frames.picture_exposure(clean)))
+plt.imshow((clean * frames.picture_exposure(clean)).clip(0, 1) ** (1 / 2.2))
 plt.show()

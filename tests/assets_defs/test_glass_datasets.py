@@ -106,20 +106,26 @@ def test_frames_are_stored_as_they_are_displayed() -> None:
             random.random((size, size, 3), np.float32),
             random.random((size, size), np.float32),
             random.random((size, size), np.float32),
+            random.random((size, size, 3), np.float32),
+            random.random((size, size, 3), np.float32),
             7,
+            16,
         )
 
     far, close, furnace = traced(4), traced(4), traced(3)
-    stage = random.random((2, 4, 4, 3)).astype(np.float32)
+    clean, stage = random.random((2, 2, 4, 4, 3)).astype(np.float32)
     moving = random.integers(0, 256, (2, 5, 5, 3), np.uint8)
-    frames = GlassFrames(far, close, stage, moving, furnace, 0.5)
-    stored = schemas.GLASS_FRAMES.conform(datasets.frames_dataset(frames))
+    frames = GlassFrames(far, close, clean, stage, moving, furnace, 0.5)
+    light = np.full((4, 8, 3), [0.1, 0.2, 0.3], np.float32)
+    stored = schemas.GLASS_FRAMES.conform(datasets.frames_dataset(frames, light))
     np.testing.assert_array_equal(stored["radiance"][1], close.radiance)
     np.testing.assert_array_equal(stored["error"][0], np.sqrt(far.variance))
     np.testing.assert_array_equal(stored["scratched"][1], close.scratched)
     np.testing.assert_array_equal(stored["moving"], moving)
     # Half the radiance, through the sRGB curve.
-    linear = 0.5 * far.radiance.astype(np.float64)
+    np.testing.assert_array_equal(stored["clean"], clean)
+    np.testing.assert_allclose(stored["surroundings"], [0.1, 0.2, 0.3], rtol=1e-6)
+    linear = 0.5 * clean[0].astype(np.float64)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     assert np.abs(stored["frames"][0] - 255 * srgb).max() <= 1
     np.testing.assert_allclose(stored["furnace"], furnace.radiance.mean(axis=2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ FURNACE_SIZE, FURNACE_SAMPLES = 48, 64
 _KEY = 0.22
 """What the picture's middle brightness is shown as: a little over a photographer's grey card."""
 _DARKEST = 1e-3
+_MOVING_ROWS = 512
+"""Of the environment of the small pictures with the moving light, texels at most."""
 
 
 class GlassFrames(NamedTuple):
@@ -193,13 +195,17 @@ def draw_moving_light(
     progress: Callable[[float], None],
 ) -> NDArray[np.uint8]:
     """The close view on the stage while the light turns once around: (count, size, size, 3)."""
+    import cv2
+
+    radiance: NDArray[Any] = light.radiance
+    rows = min(len(light.radiance), _MOVING_ROWS)
+    if rows < len(radiance):
+        radiance = cv2.resize(radiance, (2 * rows, rows), interpolation=cv2.INTER_AREA)
     camera = object_cameras(glass.solid)[1]
     pictures = []
     for number in range(count):
         progress(number / count)
-        turned = make_environment_sampler(
-            rotate_environment(light.radiance, 360.0 * number / count)
-        )
+        turned = make_environment_sampler(rotate_environment(radiance, 360.0 * number / count))
         drawn = draw_scratched(
             glass.actor, turned, camera, width=size, height=size, supersampling=2
         )

@@ -61,7 +61,8 @@ class TracedPicture(NamedTuple):
     ``radiance`` (H, W, 3) float32 linear; ``variance`` (H, W) float32 of its mean over the
     channels; ``scratched`` (H, W) float32: share of the paths that met a scratch; ``smooth``
     (H, W, 3) float32: the part of the radiance that came by paths that met none; ``normal``
-    (H, W, 3) float32: mean of the unit normals that are seen first, 0 beside the object; ``rays``.
+    (H, W, 3) float32: mean of the unit normals that are seen first, 0 beside the object; ``rays``
+    that it took; ``samples``: paths a pixel.
     """
 
     radiance: NDArray[np.float32]
@@ -70,6 +71,7 @@ class TracedPicture(NamedTuple):
     smooth: NDArray[np.float32]
     normal: NDArray[np.float32]
     rays: int
+    samples: int
 
 
 def make_scratched_surface(
@@ -137,6 +139,7 @@ def trace_picture(
         smooth.reshape(*grid, 3),
         normal.reshape(*grid, 3),
         rays,
+        samples,
     )
 
 

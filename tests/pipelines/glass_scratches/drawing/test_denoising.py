@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from benchmarks.scratches_pictures import Judged, contrast_kept
 from pipelines.drawing.colour import luminance
 from pipelines.geometry.solid_shapes import plate
+from pipelines.glass_scratches.drawing import denoising
 from pipelines.glass_scratches.drawing.denoising import denoised
 from pipelines.glass_scratches.drawing.frames import picture_exposure
 from pipelines.glass_scratches.drawing.path_tracing import TracedPicture
@@ -42,7 +43,7 @@ def scratched_wall() -> tuple[TracedPicture, Floats]:
     smooth, scattered = (1 - met)[..., None] * wall, found[..., None] * light
     normal = np.broadcast_to([0.0, -1.0, 0.0], wall.shape)
     parts = (smooth + scattered, met, met, smooth, normal)
-    traced = TracedPicture(*(part.astype(np.float32) for part in parts), 0)
+    traced = TracedPicture(*(part.astype(np.float32) for part in parts), 0, PATHS)
     return traced, (1 - share)[..., None] * wall + share[..., None] * light
 
 
@@ -78,6 +79,24 @@ def test_contrast_is_that_of_the_reference_whatever_noise_there_is(
     same = judged._replace(clean=judged.reference, noisy=judged.reference + noise)
     assert contrast_kept(same, "clean") == pytest.approx(1.0)
     assert contrast_kept(same, "noisy") == pytest.approx(1.0, abs=0.03)
+
+
+def test_contrast_needs_scratches(scratched_wall: tuple[TracedPicture, Floats]) -> None:
+    judged = _judged(scratched_wall)
+    with pytest.raises(ValueError, match=r"no pixel shows scratches"):
+        contrast_kept(judged._replace(scratched=0 * judged.scratched), "clean")
+
+
+def test_of_few_paths_the_share_loses_noise_and_not_its_detail() -> None:
+    """The error falls; where all paths or none met a scratch, sharp edges stay as they are."""
+    random = np.random.default_rng(6)
+    row, column = np.mgrid[:SIZE, :SIZE]
+    faint = 0.15 + 0.1 * np.sin(row / 9.0) * np.sin(column / 13.0)
+    found = (random.binomial(16, faint) / 16).astype(np.float32)
+    quiet = denoising._quiet_share(found, 16)
+    assert np.std(quiet - faint) < 0.4 * np.std(found - faint)
+    sharp = ((2 * row + column) % 37 < 6).astype(np.float32)
+    np.testing.assert_allclose(denoising._quiet_share(sharp, 16), sharp, atol=1e-3)
 
 
 def test_light_is_kept(scratched_wall: tuple[TracedPicture, Floats]) -> None:
