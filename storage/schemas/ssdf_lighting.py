@@ -218,7 +218,7 @@ ENVIRONMENT_LIGHTS = Schema(
             ("row", "column", "channel"),
             "float32",
             "1",
-            "The environment, equirectangular, z up, averaged down",
+            "The environment, equirectangular, z up, averaged down to 1024 rows at most",
         ),
         "axes": Variable(("light", "axis"), "float64", "1", "p, unit vectors to the lights"),
         "sharpness": Variable(("light",), "float64", "1", "λ"),
@@ -226,6 +226,9 @@ ENVIRONMENT_LIGHTS = Schema(
         "error": Variable((), "float64", "1", "Relative RMS error of radiance"),
         "tone_error": Variable((), "float64", "1", "Relative RMS error of log(1 + L / mean)"),
         "irradiance_error": Variable((), "float64", "1", "Relative RMS error of irradiance"),
+        "shadowed_error": Variable(
+            (), "float64", "1", "Relative RMS error of irradiance behind random occluders"
+        ),
         "flux_error": Variable((), "float64", "1", "Relative error of the radiance's integral"),
     },
 )
@@ -245,7 +248,10 @@ RELIT_FRAMES = Schema(
             ("y", "x", "channel"), "uint8", "1", "The first frame from SSDFs not compressed"
         ),
         "reference": Variable(
-            ("y", "x", "channel"), "uint8", "1", "The first frame, traced with rays to the same SGs"
+            ("y", "x", "channel"),
+            "uint8",
+            "1",
+            "The first frame, traced under the environment itself",
         ),
         "clusters": Variable(
             ("y", "x", "channel"), "uint8", "1", "Clusters in colours", "figure 2"

@@ -1,9 +1,11 @@
-// A mesh lit by spherical Gaussians: distances to the edge of the visible sky, four in a vector:
+// A mesh lit by spherical Gaussians and by its own surfaces (bounced: radiance of an albedo of 1
+// under what they reflect): distances to the edge of the visible sky, four in a vector:
 // of LIGHTS matt lobes, and after these, from a new vector on, of as many glossy ones: attributes,
 // or, with EDGES_FETCHED, texels of lit_distances.glsl, EDGE_ROWS rows a vector. With textures
 // (TEXTURED) it has places in them and a colour, else the number of its material.
 
 in vec3 shading;
+in vec3 bounced;
 #if TEXTURED
 in vec3 paint;
 in vec4 mappings;
@@ -20,11 +22,13 @@ uniform sampler2D fetchedEdges;
 in vec4 edge0, edge1, edge2, edge3, edge4, edge5, edge6, edge7, edge8, edge9, edge10, edge11;
 #endif
 out vec3 shadingOut;
+out vec3 bouncedOut;
 out vec3 placeOut;
 out vec4 edges[EDGES];
 
 void placeVertex() {
   shadingOut = shading;
+  bouncedOut = bounced;
   placeOut = vertexMC.xyz;
 #if TEXTURED
   paintOut = paint;

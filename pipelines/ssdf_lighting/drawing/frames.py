@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
+from pipelines.ssdf_lighting.drawing.bounced_light import BouncedLight
+from pipelines.ssdf_lighting.drawing.light_sources import LightSource
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor
+from pipelines.ssdf_lighting.light.interreflection import BounceFactors
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
 
@@ -48,22 +51,26 @@ def draw_turning_light(
     progress: Progress = lambda fraction: None,
     *,
     supersampling: int = 1,
+    bounce: BounceFactors | None = None,
 ) -> TurningLight:
     """Draw the scene for each turn (degrees about up) of its lights.
 
-    ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
+    ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3). With ``bounce`` the
+    scene's surfaces light each other, too.
     """
     split = split_by_part(scene)
     actor = LitActor(split.mesh, lights)
+    reflected = None if bounce is None else BouncedLight(scene, bounce, lights)
     pictures, seconds = [], []
     with Stage(*size, background=BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)
         stage.look(camera)
         for number, turn in enumerate(turns):
             begin = time.perf_counter()
-            actor.relight(
-                camera, rotated(lights, turn), lambda axes: distances_along(split.source, axes)
-            )
+            turned = rotated(lights, turn)
+            actor.relight(camera, turned, lambda axes: distances_along(split.source, axes))
+            if reflected is not None:
+                actor.show_bounced(reflected.at_vertices(turned, distances_along)[split.source])
             stage.draw()
             seconds.append(time.perf_counter() - begin)
             pictures.append(stage.radiance())
@@ -75,7 +82,7 @@ def draw_turning_light(
 
 def traced_reference(
     scene: Scene,
-    lights: Lights,
+    source: LightSource,
     camera: Camera,
     size: tuple[int, int],
     samples: int,
@@ -83,10 +90,10 @@ def traced_reference(
     seed: int = 0,
     progress: Progress = lambda fraction: None,
 ) -> Traced:
-    """The same picture by rays towards the same lights, none of the method's shortcuts."""
+    """The same picture of direct light by rays, none of the method's shortcuts."""
     return ray_traced(
         split_by_part(scene).mesh,
-        lights,
+        source,
         camera,
         size,
         samples,

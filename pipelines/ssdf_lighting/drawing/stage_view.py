@@ -33,7 +33,8 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import LitMesh
 
 MOST_LIGHTS = 24
-"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
+"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes, and position, normal,
+bounced light and one or two of the material."""
 _FINE = 2048
 """Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
 
@@ -107,6 +108,14 @@ class LitActor:
         for part in self._parts:
             part.show_distances(distances)
 
+    def show_bounced(self, light: NDArray[np.floating]) -> None:
+        """Add light that other surfaces reflect: (V, 3), what albedo 1 would show of it."""
+        expected = (len(self._points), 3)
+        if light.shape != expected:
+            raise ValueError(f"bounced light: found shape {light.shape}, expected {expected}.")
+        for part in self._parts:
+            part.show_bounced(light)
+
     def _set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         for part in self._parts:
             part.set_lights(seen_from, lights)
@@ -158,6 +167,7 @@ class _Part:
             corners.reshape(-1, 3),
             attributes={
                 "shading": normals[self._chosen],
+                "bounced": np.zeros((len(self._chosen), 3), np.float32),
                 **{name: values[self._chosen] for name, values in finish.attributes.items()},
                 # Each its own: the mesh keeps them, and they are written to.
                 **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
@@ -175,6 +185,7 @@ class _Part:
             lit=False,
         )
         self._arrays, self._edges = _arrays_of(self.actor, names)
+        (self._bounced_array,), (self._bounced,) = _arrays_of(self.actor, ["bounced"])
         self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
         for name, values in finish.uniforms.items():
             self._uniforms.SetUniform4f(name, values)
@@ -192,6 +203,10 @@ class _Part:
             first = half * self._count + 4 * group
             values[:, :width] = distances[self._chosen, first : first + width]
             array.Modified()
+
+    def show_bounced(self, light: NDArray[np.floating]) -> None:
+        self._bounced[:] = light[self._chosen]
+        self._bounced_array.Modified()
 
     def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         rows = np.column_stack([lights.axes, lights.sharpness])
@@ -247,7 +262,7 @@ def _memory_of(made: Any) -> NDArray[np.float32]:
 
 
 def _arrays_of(actor: Any, names: list[str]) -> tuple[list[Any], list[NDArray[np.float32]]]:
-    """The named vertex attributes, and their values (V, 4); writing changes them."""
+    """The named vertex attributes, and their values (V, k); writing changes them."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     points = actor.GetMapper().GetInput().GetPointData()

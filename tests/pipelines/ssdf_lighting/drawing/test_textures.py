@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import orbit
 from pipelines.geometry import shapes
+from pipelines.ssdf_lighting.drawing.light_sources import GaussianSource
 from pipelines.ssdf_lighting.drawing.ray_tracing import ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor, draw_lit
 from pipelines.ssdf_lighting.figures import colour_error, psnr, reflectance
@@ -77,7 +78,7 @@ def drawn(scene: Scene) -> NDArray[np.float32]:
 
 def traced(scene: Scene, samples: int = 64) -> NDArray[np.float64]:
     mesh = split_by_part(scene).mesh
-    return ray_traced(mesh, LIGHTS, CAMERA, SIZE, samples, jittered=False).radiance
+    return ray_traced(mesh, GaussianSource(LIGHTS), CAMERA, SIZE, samples, jittered=False).radiance
 
 
 def pictures(scene: Scene) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
