@@ -68,7 +68,9 @@ def _scene(
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
     return make_scene(
         np.concatenate([vertices for vertices, _ in parts]),
-        np.concatenate([corners + start for (_, corners), start in zip(parts, starts, strict=False)]),
+        np.concatenate(
+            [corners + start for (_, corners), start in zip(parts, starts, strict=False)]
+        ),
         np.repeat(np.arange(len(parts)), [len(corners) for _, corners in parts]),
         Materials(np.array(colours), np.array(specular), np.full(len(parts), 0.22)),
         longest=longest,
@@ -77,7 +79,7 @@ def _scene(
 
 def _torus_knot() -> _Mesh:
     """A tube along the (2, 3) torus knot, closed in both directions."""
-    t = np.arange(_ALONG) * (2 * math.pi / _ALONG)
+    t = np.arange(_ALONG, dtype=np.float64) * (2 * math.pi / _ALONG)
 
     def middle(at: FloatArray) -> FloatArray:
         radius = 1.0 + 0.42 * np.cos(3 * at)
@@ -116,7 +118,7 @@ def _column(radius: float, height: float, foot: Sequence[float]) -> _Mesh:
     """A cylinder of 24 sides, closed at both ends."""
     angle = np.arange(24) * (2 * math.pi / 24)
     ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1)
-    vertices = np.concatenate([ring, ring + [0, 0, height], [[0, 0, 0], [0, 0, height]]])
+    vertices = np.concatenate([ring, ring + np.array([0, 0, height]), [[0, 0, 0], [0, 0, height]]])
     one, other = np.arange(24), np.roll(np.arange(24), -1)
     triangles = np.concatenate([
         np.stack([one, other, other + 24], axis=1), np.stack([one, other + 24, one + 24], axis=1),

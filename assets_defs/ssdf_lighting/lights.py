@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _HEIGHT = 256
 """Rows of the built-in environments."""
 _STORED = 1024
-"""Rows of the environment that is kept beside its lights, at most: pictures are compared with it."""
+"""Rows of the environment that is kept beside its lights, at most: frames are compared with it."""
 
 
 _SHOWN = 128
@@ -76,9 +76,8 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
 
     from pipelines.drawing.colour import auto_exposure, to_8bit
     from pipelines.light.environment_maps import texel_directions
-    from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
-
     from pipelines.ssdf_lighting.light.sphere_maps import downsampled
+    from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
 
     radiance = downsampled(dataset["radiance"].values, _SHOWN)
     again = evaluate(lights_of(dataset), texel_directions(_SHOWN))

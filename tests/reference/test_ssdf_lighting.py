@@ -79,7 +79,9 @@ def traced(materials: Materials) -> tuple[Array, Array]:
         materials,
     )
     return mean_and_error(
-        ray_traced(mesh, GaussianSource(lights()), CAMERA, SIZE, SAMPLES, seed=seed).radiance[..., :3]
+        ray_traced(mesh, GaussianSource(lights()), CAMERA, SIZE, SAMPLES, seed=seed).radiance[
+            ..., :3
+        ]
         for seed in range(RUNS)
     )
 

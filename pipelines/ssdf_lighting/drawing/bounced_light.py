@@ -22,7 +22,9 @@ class BouncedLight:
         self._factors, self._cosine = factors, cosine_lobes(lights.sharpness)
         self._table = visible_table()
         # Each once, in order: distances are decoded block by block.
-        self._vertices, self._place = np.unique(factors.samples, return_inverse=True)
+        self._vertices, self._place = np.unique(
+            factors.samples.astype(np.int64), return_inverse=True
+        )
         self._normals = scene.normals[self._vertices]
 
     def at_vertices(

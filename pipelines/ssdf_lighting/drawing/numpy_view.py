@@ -32,8 +32,8 @@ def render_numpy(
     """Linear radiance and coverage (height, width, 4) float64, row 0 at the top.
 
     ``size`` is (width, height). One ray through each pixel's middle; normals and the vertices'
-    distances are interpolated by barycentric weights; textures are not looked at. ``bounced`` (V, 3)
-    is what albedo 1 would show of light that other surfaces reflect. Raises ValueError
+    distances are interpolated by barycentric weights; textures are not looked at. ``bounced``
+    (V, 3) is what albedo 1 would show of light that other surfaces reflect. Raises ValueError
     as ``build_scene`` and ``lobe_tables``.
     """
     points, corners, shading, material, materials, _ = mesh

@@ -33,8 +33,8 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import LitMesh
 
 MOST_LIGHTS = 24
-"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes, and position, normal,
-bounced light and one or two of the material."""
+"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes, and position,
+normal, bounced light and one or two of the material."""
 _FINE = 2048
 """Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
 

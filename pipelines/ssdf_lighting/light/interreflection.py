@@ -25,7 +25,6 @@ from pipelines.ssdf_lighting.scene import Scene
 
 Floats = NDArray[np.float32]
 
-PATCHES = 256
 RANK = 24
 _SAMPLES = 12  # vertices whose light stands for a patch's
 _SIDE = 32  # rays are cast in so many squared directions
@@ -58,13 +57,17 @@ class BounceFactors(NamedTuple):
 
 
 def bounce_factors(
-    scene: Scene, origins: RayOrigins, progress: Callable[[float], None] = lambda fraction: None
+    scene: Scene,
+    origins: RayOrigins,
+    patches: int,
+    progress: Callable[[float], None] = lambda fraction: None,
 ) -> BounceFactors:
-    """Cast rays from the vertices (``origins``, as of their visibility) to the patches.
+    """Cast rays from the vertices (``origins``, as of their visibility) to about so many patches.
 
-    A surface that is seen from behind shines as its front does, as it is drawn.
+    They are fewer where there are few triangles, and a little more, as each is of one material. A
+    surface that is seen from behind shines as its front does, as it is drawn.
     """
-    patch = _patches(scene)
+    patch = _patches(scene, patches)
     count = int(patch.max()) + 1
     factors = _form_factors(scene, origins, patch, count, progress)
     vectors, weights = _low_rank(factors)
@@ -117,7 +120,7 @@ def _areas(scene: Scene) -> NDArray[np.float64]:
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
 
 
-def _patches(scene: Scene) -> NDArray[np.int64]:
+def _patches(scene: Scene, most: int) -> NDArray[np.int64]:
     """(F,): patch of each triangle; triangles that lie and look alike, of one material."""
     from scipy.cluster.vq import kmeans2
 
@@ -125,7 +128,7 @@ def _patches(scene: Scene) -> NDArray[np.int64]:
     facing = scene.normals[scene.triangles].mean(axis=1)
     places = np.concatenate([corners.mean(axis=1), _BENT * facing], axis=1)
     # A mean of so many triangles at least, or there would be patches of nothing.
-    wanted = max(1, min(PATCHES, len(places) // 8))
+    wanted = max(1, min(most, len(places) // 8))
     _, label = kmeans2(places, wanted, minit="++", seed=0, iter=12)
     both = label.astype(np.int64) * (int(scene.part.max()) + 1) + scene.part
     return np.unique(both, return_inverse=True)[1].reshape(-1)

@@ -82,7 +82,7 @@ class _Sun(NamedTuple):
 def _brightest(map_: FloatArray, ways: FloatArray, omega: FloatArray) -> _Sun | None:
     """The sun about the brightest texel, or nothing where that is part of something wide."""
     height = len(map_)
-    bright = luminance(map_)
+    bright: FloatArray = np.asarray(luminance(map_), np.float64)
     row, column = np.unravel_index(int(bright.argmax()), bright.shape)
     texel = math.pi / height
     near = slice(

@@ -41,7 +41,9 @@ def plane(
     materials: Materials, lights: Lights, camera: Camera, *, count: int = 30, samples: int = 64
 ) -> Traced:
     """``count`` x ``count`` pixels of a plane, all alike."""
-    return ray_traced(lit(FLOOR, materials), GaussianSource(lights), camera, (count, count), samples, seed=1)
+    return ray_traced(
+        lit(FLOOR, materials), GaussianSource(lights), camera, (count, count), samples, seed=1
+    )
 
 
 def hemisphere(count: int = 500) -> tuple[Array, Array]:
@@ -120,7 +122,9 @@ def test_light_from_below_the_triangle_does_not_arrive() -> None:
     """Normals that lean over towards a light below the horizon."""
     normals = np.tile([0.8, 0.0, 0.6], (len(FLOOR.vertices), 1))
     below = Lights(np.array([[0.9797959, 0.0, -0.2]]), np.array([1000.0]), np.ones((1, 3)))
-    traced = ray_traced(lit(FLOOR, WHITE)._replace(normals=normals), GaussianSource(below), DOWN, (4, 4), 64)
+    traced = ray_traced(
+        lit(FLOOR, WHITE)._replace(normals=normals), GaussianSource(below), DOWN, (4, 4), 64
+    )
     assert traced.radiance[..., :3].max() < 1e-6
 
 
