@@ -49,7 +49,7 @@ from pipelines.ssdf_lighting.scene import Scene
 Array = NDArray[np.float64]
 
 SIZE = (240, 180)
-SAMPLES, RUNS = 256, 2  # a pixel, of each of the pictures that the truth is the mean of
+SAMPLES, RUNS = 64, 2  # a pixel, of each of the pictures that the truth is the mean of
 DEPTHS = {"probe": 2, "bounce": 6}  # edges of a path; 2: direct light
 SIDE = 64  # of the directions
 RMSE = 0.006  # the graph's own

@@ -4,14 +4,21 @@
 // or, with EDGES_FETCHED, texels of lit_distances.glsl, EDGE_ROWS rows a vector. With textures
 // (TEXTURED) it has places in them and a colour, else the number of its material.
 
-in vec3 shading;
-in vec3 bounced;
+// Textures, and distances as attributes: there are no more than 16. So the other vectors take
+// bounced with them, shading and paint red and green behind them, shading blue as its length less 1.
 #if TEXTURED
+#if EDGES_FETCHED
+in vec3 shading, bounced;
 in vec3 paint;
+#else
+in vec4 shading;
+in vec4 paint;
+#endif
 in vec4 mappings;
 out vec3 paintOut;
 out vec4 mappingsOut;
 #else
+in vec3 shading, bounced;
 in float object;
 flat out float objectOut;
 #endif
@@ -27,11 +34,16 @@ out vec3 placeOut;
 out vec4 edges[EDGES];
 
 void placeVertex() {
+#if TEXTURED && !EDGES_FETCHED
+  shadingOut = normalize(shading.xyz);
+  bouncedOut = vec3(shading.w, paint.w, length(shading.xyz) - 1.0);
+#else
   shadingOut = shading;
   bouncedOut = bounced;
+#endif
   placeOut = vertexMC.xyz;
 #if TEXTURED
-  paintOut = paint;
+  paintOut = paint.rgb;
   mappingsOut = mappings;
 #else
   objectOut = object;

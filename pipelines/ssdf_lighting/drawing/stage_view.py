@@ -166,9 +166,7 @@ class _Part:
             points[self._chosen],
             corners.reshape(-1, 3),
             attributes={
-                "shading": normals[self._chosen],
-                "bounced": np.zeros((len(self._chosen), 3), np.float32),
-                **{name: values[self._chosen] for name, values in finish.attributes.items()},
+                **_packed(normals[self._chosen], finish, self._chosen),
                 # Each its own: the mesh keeps them, and they are written to.
                 **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
             },
@@ -185,7 +183,8 @@ class _Part:
             lit=False,
         )
         self._arrays, self._edges = _arrays_of(self.actor, names)
-        (self._bounced_array,), (self._bounced,) = _arrays_of(self.actor, ["bounced"])
+        self._normals = normals[self._chosen]
+        self._room = ["shading", "paint"] if "paint" in finish.attributes else ["bounced"]
         self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
         for name, values in finish.uniforms.items():
             self._uniforms.SetUniform4f(name, values)
@@ -205,14 +204,34 @@ class _Part:
             array.Modified()
 
     def show_bounced(self, light: NDArray[np.floating]) -> None:
-        self._bounced[:] = light[self._chosen]
-        self._bounced_array.Modified()
+        chosen = light[self._chosen]
+        arrays, values = _arrays_of(self.actor, self._room)
+        if len(values) == 1:
+            values[0][:] = chosen
+        else:
+            values[0][:, :3] = self._normals * (1.0 + chosen[:, 2:])
+            values[0][:, 3], values[1][:, 3] = chosen[:, 0], chosen[:, 1]
+        for array in arrays:
+            array.Modified()
 
     def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         rows = np.column_stack([lights.axes, lights.sharpness])
         self._uniforms.SetUniform4f("eye", seen_from.tolist())
         for name, values in (("lights", rows), ("amplitudes", lights.amplitudes)):
             self._uniforms.SetUniform1fv(name, values.size, values.ravel().tolist())
+
+
+def _packed(
+    normals: NDArray[np.float32], finish: Finish, chosen: NDArray[np.integer]
+) -> dict[str, NDArray[Any]]:
+    """Attributes besides the distances, with room for reflected light: see lit_vertex.glsl."""
+    others = {name: values[chosen] for name, values in finish.attributes.items()}
+    none = np.zeros((len(chosen), 3), np.float32)
+    if "paint" not in others:
+        return {"shading": normals, "bounced": none, **others}
+    with_room = {"shading": normals, "paint": others.pop("paint").astype(np.float32)}
+    packed = {name: np.hstack([values, none[:, :1]]) for name, values in with_room.items()}
+    return {**packed, **others}
 
 
 def draw_lit(

@@ -92,7 +92,7 @@ def _brightest(map_: FloatArray, ways: FloatArray, omega: FloatArray) -> _Sun | 
         np.minimum(0.5 * np.linalg.norm(ways[near] - ways[row, column], axis=-1), 1.0)
     )
     radius = _radius(bright[near], off, float(bright[row, column]), texel)
-    if radius is None:
+    if radius is None or texel > _MOST_RADIUS:
         return None
     ring = (off > radius) & (off <= 1.5 * radius + texel)
     around = np.median(map_[near][ring], axis=0)
@@ -106,7 +106,8 @@ def _brightest(map_: FloatArray, ways: FloatArray, omega: FloatArray) -> _Sun | 
     weights /= weights.sum()
     mean = weights @ ways[rows, columns]
     axis = mean / np.linalg.norm(mean)
-    spread = float(weights @ (1.0 - ways[rows, columns] @ axis))
+    # A texel has a width itself.
+    spread = float(weights @ (1.0 - ways[rows, columns] @ axis)) + texel**2 / 12.0
     sharpness = min(1.0 / max(spread, 1e-30), sharpness_of_disc(SUN_RADIUS))
     return _Sun(axis, sharpness, flux, rows, columns, above)
 

@@ -54,7 +54,7 @@ function brightest(map: Float64Array, { height, count, ways, omega }: Sphere) {
     near.push({ p, off: 2 * Math.asin(Math.min(chord / 2, 1)) });
   }
   const radius = radiusOf(near, bright, bright(peak), texel);
-  if (radius === undefined) return undefined;
+  if (radius === undefined || texel > MOST_RADIUS) return undefined;
   const ring = near.filter(({ off }) => off > radius && off <= 1.5 * radius + texel);
   const around = [0, 1, 2].map((channel) => median(ring.map(({ p }) => map[3 * p + channel])));
   const texels = near.filter(({ off }) => off <= radius).map(({ p }) => p);
@@ -68,7 +68,7 @@ function brightest(map: Float64Array, { height, count, ways, omega }: Sphere) {
   const spread = texels.reduce((sum, p, k) => {
     const cosine = axis.reduce((part, value, c) => part + value * ways[3 * p + c], 0);
     return sum + (weights[k] / total) * (1 - cosine);
-  }, 0);
+  }, texel ** 2 / 12); // a texel has a width itself
   const sharpness = Math.min(1 / Math.max(spread, 1e-30), 4 / SUN_RADIUS ** 2);
   return { axis, sharpness, flux, texels, above };
 }
