@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from pipelines.ssdf_lighting.drawing.frames import RelitFrames
+    from pipelines.ssdf_lighting.drawing.frames import Illumination, RelitFrames
     from pipelines.ssdf_lighting.drawing.viewpoints import Viewpoint
 
 _GAIN = 8.0
@@ -196,12 +196,7 @@ def relit_frames(
     from pipelines.ssdf_lighting.drawing import frames
     from pipelines.ssdf_lighting.drawing.viewpoints import viewpoint
 
-    scene = scene_of(scene_mesh)
-    light = frames.Illumination(
-        lights_of(environment_lights),
-        environment_lights["radiance"].values,
-        bounce_of(bounce_factors),
-    )
+    scene, light = scene_of(scene_mesh), _illumination(environment_lights, bounce_factors)
     size = (settings.width, settings.width * 3 // 4)
     view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
     turns = [360.0 * number / settings.frames for number in range(settings.frames)]
@@ -216,6 +211,13 @@ def relit_frames(
         "sharpest λ": float(light.lights.sharpness.max()),
         **_told(found, view),
     }
+
+
+def _illumination(environment_lights: xr.Dataset, bounce_factors: xr.Dataset) -> Illumination:
+    from pipelines.ssdf_lighting.drawing.frames import Illumination
+
+    environment = environment_lights["radiance"].values
+    return Illumination(lights_of(environment_lights), environment, bounce_of(bounce_factors))
 
 
 def _told(found: RelitFrames, view: Viewpoint) -> dict[str, Any]:

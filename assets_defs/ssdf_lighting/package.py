@@ -100,6 +100,7 @@ def lit_package(
     settings: LitPackageSettings,
     keys: Mapping[str, str],
     lineage: Sequence[Mapping[str, Any]],
+    *,
     scene_mesh: xr.Dataset,
     triangle_clusters: xr.Dataset,
     ssdf_basis: xr.Dataset,
