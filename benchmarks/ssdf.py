@@ -77,6 +77,9 @@ def run(scale: str) -> dict[str, Any]:
         from benchmarks.ssdf_pictures import picture_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))
+    from benchmarks.ssdf_probe import probe_figures
+
+    _timed(figures, "probe", probe_figures)
     return figures
 
 

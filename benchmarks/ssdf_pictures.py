@@ -98,16 +98,12 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
 
 def _by_mitsuba(scene: Scene, lights: Any, camera: Any) -> Any:
     """Independent pictures (runs, H, W, 3)."""
-    from tests.reference.lit_scene import Part, pictures
+    from tests.reference.lit_scene import parts_of, pictures
 
-    parts = []
-    for part in range(len(scene.materials.albedo)):
-        used, corners = np.unique(scene.triangles[scene.part == part], return_inverse=True)
-        parts.append(Part(scene.vertices[used], corners.reshape(-1, 3), scene.normals[used]))
     with tempfile.TemporaryDirectory() as folder:
         render = pictures(
             Path(folder),
-            parts,
+            parts_of(scene),
             scene.materials,
             lights,
             camera,

@@ -9,6 +9,7 @@ import xarray as xr
 
 from assets_defs.ssdf_lighting import package as lit
 from assets_defs.ssdf_lighting.datasets import (
+    bounce_dataset,
     file_variables,
     lights_dataset,
     pca_variables,
@@ -21,6 +22,8 @@ from pipelines.ssdf_lighting.compression.compact_file import compress
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.drawing.live_parts import ReferenceView
 from pipelines.ssdf_lighting.light.environment_fit import Fit
+from pipelines.ssdf_lighting.light.fit_quality import FitErrors
+from pipelines.ssdf_lighting.light.interreflection import BounceFactors
 from pipelines.ssdf_lighting.light.microfacets import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import Scene, built_in_scene
@@ -81,6 +84,21 @@ def distances(lit_scene: Scene, n: int = 32) -> np.ndarray:
     return np.arcsin(np.clip(height, -1.0, 1.0)).astype(np.float32)
 
 
+def bounce_factors(lit_scene: Scene, patches: int = 3) -> BounceFactors:
+    """Patches of no surface that light all vertices, more where these are higher."""
+    height = lit_scene.vertices[:, 2:]
+    codes = np.rint(np.clip(60 + 60 * height * [[1.0, -1.0]], 0, 127)).astype(np.int8)
+    count = len(codes)
+    return BounceFactors(
+        codes,
+        np.full(2, 0.004, np.float32),
+        np.linspace(0.2, 0.6, 2 * patches, dtype=np.float32).reshape(2, patches),
+        np.full((patches, 2), 0.1, np.float32),
+        np.linspace(0.2, 0.8, 3 * patches, dtype=np.float32).reshape(patches, 3),
+        np.linspace(0, count - 1, 4 * patches).astype(np.int32).reshape(patches, 4),
+    )
+
+
 def inputs(lit_scene: Scene, n: int = 32, *, paper: bool = False) -> Any:
     """What the package's asset packs; ``paper``: the distances in the paper's form."""
     matrix, corners = distances(lit_scene, n), lit_scene.triangles
@@ -104,8 +122,12 @@ def inputs(lit_scene: Scene, n: int = 32, *, paper: bool = False) -> Any:
         scene_dataset(lit_scene, "mine"),
         xr.Dataset({"cluster": (("triangle",), cluster.astype(np.int32))}),
         basis,
+        bounce_dataset(bounce_factors(lit_scene)),
         lights_dataset(
-            sky(64, sun_azimuth=40.0, sun_elevation=35.0), Fit(LIGHTS, 0.1, 0.1, 0.01), 0.0, "sky"
+            sky(64, sun_azimuth=40.0, sun_elevation=35.0),
+            Fit(LIGHTS, FitErrors(0.1, 0.1, 0.01, 0.01)),
+            0.0,
+            "sky",
         ),
         0.5,
     )

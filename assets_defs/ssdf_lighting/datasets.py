@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pipelines.ssdf_lighting.drawing.frames import RelitFrames
     from pipelines.ssdf_lighting.figures import CompressionErrors
     from pipelines.ssdf_lighting.light.environment_fit import Fit
+    from pipelines.ssdf_lighting.light.interreflection import BounceFactors
     from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
     from pipelines.ssdf_lighting.scene import Scene
 
@@ -39,6 +40,15 @@ _PCA = {
     "relative_error": ("cluster",),
 }
 """Variables of the paper's form, by the names that its fields have."""
+_BOUNCE = {
+    "codes": ("vertex", "factor"),
+    "steps": ("factor",),
+    "vectors": ("factor", "patch"),
+    "between": ("patch", "factor"),
+    "albedo": ("patch", "channel"),
+    "samples": ("patch", "sample"),
+}
+"""Variables of form factors, in the order of their fields."""
 
 
 # ---- scene_mesh ------------------------------------------------------------------------------
@@ -235,6 +245,24 @@ def decoder_of(ssdf_basis: xr.Dataset) -> Decoder:
     return Decoder.of_pca(pca, ssdf_basis.sizes["vertex"])
 
 
+# ---- bounce_factors --------------------------------------------------------------------------
+
+
+def bounce_dataset(factors: BounceFactors) -> xr.Dataset:
+    """`bounce_factors` of form factors."""
+    import xarray as xr
+
+    parts = zip(_BOUNCE.items(), factors, strict=True)
+    return xr.Dataset({name: (dims, values) for (name, dims), values in parts})
+
+
+def bounce_of(bounce_factors: xr.Dataset) -> BounceFactors:
+    """The form factors that a `bounce_factors` dataset holds."""
+    from pipelines.ssdf_lighting.light.interreflection import BounceFactors
+
+    return BounceFactors(*(bounce_factors[name].values for name in _BOUNCE))
+
+
 # ---- environment_lights, relit_frames --------------------------------------------------------
 
 
@@ -250,9 +278,7 @@ def lights_dataset(
             "axes": (("light", "axis"), fit.lights.axes),
             "sharpness": (("light",), fit.lights.sharpness),
             "amplitudes": (("light", "channel"), fit.lights.amplitudes),
-            "error": ((), fit.error),
-            "tone_error": ((), fit.tone_error),
-            "irradiance_error": ((), fit.irradiance_error),
+            **{name: ((), error) for name, error in fit.errors._asdict().items()},
             "flux_error": ((), flux_error),
         },
         attrs={"name": name},
@@ -281,6 +307,7 @@ def frames_dataset(
             "turn": (("frame",), np.array(turns)),
             "exposure": ((), found.exposure),
             "uncompressed": (pixels, found.uncompressed),
+            "direct": (pixels, found.direct),
             "reference": (pixels, found.reference),
             "clusters": (pixels, clusters),
             "covered": (("y", "x"), found.turning.covered),
@@ -293,7 +320,8 @@ LOADERS: dict[str, Callable[[StoredVersion], object]] = {
     "visibility": lambda version: visible_of(version.dataset),
     "triangle_clusters": lambda version: clusters_of(version.dataset),
     "ssdf_basis": lambda version: decoder_of(version.dataset),
+    "bounce_factors": lambda version: bounce_of(version.dataset),
     "environment_lights": lambda version: lights_of(version.dataset),
 }
 """What ``tsuya.load`` gives, by asset: the scene, what its vertices see, clusters, the decoder,
-the lights."""
+form factors, the lights."""

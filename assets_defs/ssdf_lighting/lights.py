@@ -23,16 +23,22 @@ if TYPE_CHECKING:
 
 _HEIGHT = 256
 """Rows of the built-in environments."""
-_STORED = 64
-"""Rows of the environment that is kept beside its lights."""
+_STORED = 1024
+"""Rows of the environment that is kept beside its lights, at most: frames are compared with it."""
+
+
+_SHOWN = 128
+"""Rows of the picture of it."""
 
 
 class LightSettings(Settings):
     """The environment, and how closely its lights follow it."""
 
-    lights: int = Field(16, ge=1, le=24, description="Spherical Gaussians of an environment, N")
+    lights: int = Field(24, ge=1, le=24, description="Spherical Gaussians of an environment, N")
     least_sharpness: float = Field(3.0, gt=0.0, le=100.0, description="Least λ of a light")
-    most_sharpness: float = Field(300.0, ge=100.0, le=1e4, description="Largest λ of a light")
+    most_sharpness: float = Field(
+        1000.0, ge=100.0, le=1e4, description="Largest λ of a light that is no sun"
+    )
     sun_azimuth: float = Field(25.0, ge=-360.0, le=360.0, description="Sky: the sun's, degrees")
     sun_elevation: float = Field(35.0, ge=5.0, le=85.0, description="Sky: the sun's, degrees")
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
@@ -41,16 +47,16 @@ class LightSettings(Settings):
 
 
 def _flux_error(version: StoredVersion) -> float:
-    from pipelines.ssdf_lighting.light.environment_fit import flux_error
+    from pipelines.ssdf_lighting.light.fit_quality import flux_error
 
     return flux_error(lights_of(version.dataset), version.dataset["radiance"].values)
 
 
-def _irradiance_error(version: StoredVersion) -> float:
-    from pipelines.ssdf_lighting.light.environment_fit import evaluate_fit
+def _shadowed_error(version: StoredVersion) -> float:
+    from pipelines.ssdf_lighting.light.fit_quality import fit_errors
 
     radiance = version.dataset["radiance"].values
-    return evaluate_fit(lights_of(version.dataset), radiance).irradiance_error
+    return fit_errors(lights_of(version.dataset), radiance).shadowed_error
 
 
 def _tone_error(version: StoredVersion) -> float:
@@ -70,14 +76,14 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
 
     from pipelines.drawing.colour import auto_exposure, to_8bit
     from pipelines.light.environment_maps import texel_directions
+    from pipelines.ssdf_lighting.light.sphere_maps import downsampled
     from pipelines.ssdf_lighting.light.spherical_gaussians import evaluate
 
-    radiance = dataset["radiance"].values
-    again = evaluate(lights_of(dataset), texel_directions(len(radiance)))
+    radiance = downsampled(dataset["radiance"].values, _SHOWN)
+    again = evaluate(lights_of(dataset), texel_directions(_SHOWN))
     scale = auto_exposure(radiance)
-    times = max(1, 512 // radiance.shape[1])
     both = np.vstack([to_8bit(part * scale) for part in (radiance, again)])
-    return {"environment-above-lights": both.repeat(times, axis=0).repeat(times, axis=1)}
+    return {"environment-above-lights": both.repeat(2, axis=0).repeat(2, axis=1)}
 
 
 @SSDF.asset(
@@ -94,9 +100,9 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
             at_most=1e-3,
         ),
         Check(
-            "irradiance_error",
-            "Relative RMS error of the irradiance over all normals.",
-            _irradiance_error,
+            "shadowed_error",
+            "Relative RMS error of the irradiance behind random occluders.",
+            _shadowed_error,
             at_most=0.08,
             change=0.005,
         ),
@@ -118,21 +124,23 @@ def _light_pictures(dataset: xr.Dataset) -> Pictures:
 )
 def environment_lights(settings: LightSettings, source: Source, progress: Progress) -> Result:
     """Fit spherical Gaussians to the environment."""
-    from pipelines.ssdf_lighting.light.environment_fit import downsampled, fit_lights, flux_error
+    from pipelines.ssdf_lighting.light.environment_fit import fit_lights
+    from pipelines.ssdf_lighting.light.fit_quality import flux_error
+    from pipelines.ssdf_lighting.light.sphere_maps import downsampled
 
     light = _light(settings, source)
-    small = downsampled(light.radiance, _STORED)
+    kept = downsampled(light.radiance, min(len(light.radiance), _STORED))
     fit = fit_lights(
-        small,
+        light.radiance,
         settings.lights,
         least_sharpness=settings.least_sharpness,
         most_sharpness=settings.most_sharpness,
         progress=progress,
     )
-    dataset = lights_dataset(small, fit, flux_error(fit.lights, small), source.name)
+    dataset = lights_dataset(kept, fit, flux_error(fit.lights, kept), source.name)
     return dataset, {
         "sharpest λ": float(fit.lights.sharpness.max()),
-        "irradiance error": fit.irradiance_error,
+        "shadowed error": fit.errors.shadowed_error,
         NOTES: light.notes,
     }
 

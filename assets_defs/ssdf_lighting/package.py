@@ -9,7 +9,7 @@ from pydantic import Field
 
 from assets_defs.packages import PackageSettings, package_dataset, read_back_check
 from assets_defs.settings import Preset
-from assets_defs.ssdf_lighting.datasets import decoder_of, lights_of, scene_of
+from assets_defs.ssdf_lighting.datasets import bounce_of, decoder_of, lights_of, scene_of
 from assets_defs.ssdf_lighting.declaration import ENVIRONMENTS, SCENES, SSDF
 from assets_defs.system import Result
 from storage.schemas import ssdf_lighting as schemas
@@ -50,9 +50,14 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
     """Parts as the datasets have them, by NumPy alone."""
     import numpy as np
 
+    from pipelines.ssdf_lighting.light.sphere_maps import downsampled
+
     basis, lights = version.input("ssdf_basis"), version.input("environment_lights")
     scene, clusters = version.input("scene_mesh"), version.input("triangle_clusters")
-    radiance = np.minimum(lights["radiance"].values, 65504.0)
+    bounce = version.input("bounce_factors")
+    rows = min(lights.sizes["row"], 64)
+    radiance = downsampled(lights["radiance"].values, rows).astype(np.float32)
+    radiance = np.minimum(radiance, 65504.0)
     form = ("file",) if "file" in basis else _PAPERS_FORM
     parts = {name: basis[name].values for name in form}
     if "file" in parts:
@@ -72,6 +77,7 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
         **expected,
         "triangle_cluster": clusters["cluster"].values.astype(np.uint16),
         "environment": radiance.astype(np.float16),
+        **{f"bounce_{name}": bounce[name].values for name in bounce},
     }
 
 
@@ -79,7 +85,14 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
     schemas.LIT_PACKAGE,
     by=("scene", "environment"),
     settings=LitPackageSettings,
-    inputs=("scene_mesh", "triangle_clusters", "ssdf_basis", "environment_lights", "relit_frames"),
+    inputs=(
+        "scene_mesh",
+        "triangle_clusters",
+        "ssdf_basis",
+        "bounce_factors",
+        "environment_lights",
+        "relit_frames",
+    ),
     kinds=frozenset({"zarr", "pyvista"}),
     checks=(read_back_check(_expected),),
 )
@@ -87,9 +100,11 @@ def lit_package(
     settings: LitPackageSettings,
     keys: Mapping[str, str],
     lineage: Sequence[Mapping[str, Any]],
+    *,
     scene_mesh: xr.Dataset,
     triangle_clusters: xr.Dataset,
     ssdf_basis: xr.Dataset,
+    bounce_factors: xr.Dataset,
     environment_lights: xr.Dataset,
     relit_frames: xr.Dataset,
 ) -> Result:
@@ -101,6 +116,7 @@ def lit_package(
         scene_mesh,
         triangle_clusters,
         ssdf_basis,
+        bounce_factors,
         environment_lights,
         float(relit_frames["exposure"]),
     )
@@ -116,6 +132,7 @@ class _Inputs(NamedTuple):
     scene_mesh: xr.Dataset
     triangle_clusters: xr.Dataset
     ssdf_basis: xr.Dataset
+    bounce_factors: xr.Dataset
     environment_lights: xr.Dataset
     exposure: float
 
@@ -137,10 +154,11 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
     size = (settings.view_width, settings.view_width * 3 // 4)
     view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
     cluster = inputs.triangle_clusters["cluster"].values
+    bounce = bounce_of(inputs.bounce_factors)
     return _Pictures(
         view.camera,
         live_parts.reference_views(
-            scene, lights, distances, cluster, view.camera, size, inputs.exposure
+            scene, lights, distances, cluster, view.camera, size, inputs.exposure, bounce
         ),
         live_parts.poster(
             scene,
@@ -149,6 +167,7 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
             lambda aspect: scene_camera(scene, view.azimuth, view.elevation, aspect),
             settings.poster_width,
             inputs.exposure,
+            bounce,
         ),
     )
 
@@ -177,6 +196,7 @@ def _contents(
             "background": live_parts.background(),
             "rmse": float(inputs.ssdf_basis["rmse"]),
             "irradiance_error": float(inputs.environment_lights["irradiance_error"]),
+            "shadowed_error": float(inputs.environment_lights["shadowed_error"]),
         },
         _views(pictures),
         _figures(inputs, lineage),
@@ -221,7 +241,8 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
             f"light_{name}": lights[name].values.astype(np.float32)
             for name in ("axes", "sharpness", "amplitudes")
         },
-        "environment": live_parts.halfs(lights["radiance"].values),
+        **{f"bounce_{name}": part.values for name, part in inputs.bounce_factors.items()},
+        "environment": live_parts.shown_environment(lights["radiance"].values),
     }
 
 
@@ -285,6 +306,7 @@ def _views(pictures: _Pictures) -> list[View]:
                 "turn": view.turn,
                 "shadows": view.shadows,
                 "clusters": view.clusters,
+                "reflected": True,
                 "behind": False,
                 "exposure": 0.0,
             },
@@ -306,6 +328,7 @@ def _figures(inputs: _Inputs, lineage: Sequence[Mapping[str, Any]]) -> list[Figu
         Figure("error of the angle", float(basis["rmse"]), "rad"),
         Figure("share of the sky with wrong visibility", float(basis["wrong_visibility"])),
         Figure("relative error of irradiance", float(lights["irradiance_error"])),
+        Figure("relative error of irradiance behind occluders", float(lights["shadowed_error"])),
     ]
     if "relative_error" in basis:
         cumulative = float(basis["relative_error"].sum())
@@ -314,7 +337,7 @@ def _figures(inputs: _Inputs, lineage: Sequence[Mapping[str, Any]]) -> list[Figu
     checks = {name: one for each in lineage for name, one in each.get("checks", {}).items()}
     for name, meaning in (
         ("relit_psnr", "PSNR of the first frame against SSDFs not compressed"),
-        ("reference_psnr", "PSNR of the first frame against the traced picture"),
+        ("probe_psnr", "PSNR of direct light against rays under the environment itself"),
     ):
         if name in checks:
             stated.append(Figure(meaning, float(checks[name]["figure"]), "dB"))

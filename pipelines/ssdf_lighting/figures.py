@@ -109,6 +109,23 @@ def visibility_error(
     return wrong / _SAMPLED_RAYS
 
 
+def closure_error(
+    sums: NDArray[np.floating],
+    visible: NDArray[np.bool_],
+    normals: FloatArray,
+    directions: FloatArray,
+    solid_angle: FloatArray,
+) -> float:
+    """RMS over V vertices of how far form factors (their sums, (V,)) and the visible sky, weighted
+    by the cosine, are from filling the hemisphere: both together have to be 1.
+
+    visible (V, D) in directions (D, 3) of solid angles (D,); normals (V, 3).
+    """
+    falling = np.maximum(normals @ directions.T, 0.0) * solid_angle
+    sky = (falling * visible).sum(axis=1) / falling.sum(axis=1)
+    return float(np.sqrt(np.mean((sums + sky - 1.0) ** 2)))
+
+
 def all_pairs_distances(visible: NDArray[np.bool_]) -> FloatArray:
     """d (P, D) by its definition: every direction with every one of the other visibility."""
     directions = texel_directions(resolution_of(visible.shape[1]))

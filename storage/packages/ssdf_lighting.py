@@ -33,14 +33,20 @@ along x. d is interpolated linearly between four texels; beyond the border lies 
 mirrored about its middle.
 
 **Light.** The environment is the sum of `light_amplitudes` exp(λ (v·p - 1)), with axes p and λ
-`light_sharpness`. Turned by t degrees, its axes turn counter-clockwise about z. Each light has a
-lobe of the matt part and one of the gloss at each vertex; d is looked up along their axes and
-interpolated over the triangle: `lit_lobes.glsl` has the axes, `ssdf_lookup.glsl` d,
-`sg_matt.glsl` and `sg_gloss.glsl` the radiance of a pixel. `gloss_lobes` has, at cosines n·o from
-0 to 1, the gloss as a Gaussian: λ, its axis as factors of the mirrored view and of the normal, ln
-of its amplitude. Its rows are the materials', then, where materials vary, those of 5 F0 from 0.02
-to 0.99 times 12 slopes from 0.05 to 1, even in their logarithms, slopes fastest. `LOBES` is the
-row whose axes a vertex has.
+`light_sharpness`; the sharpest are suns. Turned by t degrees, its axes turn counter-clockwise
+about z. Each light has a lobe of the matt part and one of the gloss at each vertex; d is looked
+up along their axes and interpolated over the triangle: `lit_lobes.glsl` has the axes,
+`ssdf_lookup.glsl` d, `sg_matt.glsl` and `sg_gloss.glsl` the radiance of a pixel. `gloss_lobes`
+has, at cosines n·o from 0 to 1, the gloss as a Gaussian: λ, its axis as factors of the mirrored
+view and of the normal, ln of its amplitude. Its rows are the materials', then, where materials
+vary, those of 5 F0 from 0.02 to 0.99 times 12 slopes from 0.05 to 1, even in their logarithms,
+slopes fastest. `LOBES` is the row whose axes a vertex has.
+
+**Reflected light.** Surfaces are cut into patches. With s (P, 3), the mean over `bounce_samples`
+of the matt parts' radiance for an albedo of 1 under direct light, b = `bounce_albedo` times s is
+what patches send and g = `bounce_vectors` b; four times more b = `bounce_albedo` times (s +
+`bounce_between` g) and g = `bounce_vectors` b. A vertex adds `bounce_codes` (`bounce_steps` g),
+not below 0, interpolated and times the albedo.
 
 **Materials** that vary: `factors` times what `map_*` says; colour maps are sRGB codes, surface
 maps shares of F0 (red), of the roughness (green) and of the metalness (blue), normal maps as
@@ -102,6 +108,19 @@ _PAPERS_FORM: dict[str, Part] = {
     ),
 }
 
+_BOUNCE: dict[str, Part] = {
+    "bounce_codes": ArrayPart(
+        ("vertex", "factor"), "int8", "1", "Reflected light: weights of each row of the SSDFs"
+    ),
+    "bounce_steps": ArrayPart(("factor",), "float32", "1", "What a code of 1 stands for"),
+    "bounce_vectors": ArrayPart(("factor", "patch"), "float32", "1", "What is weighted"),
+    "bounce_between": ArrayPart(("patch", "factor"), "float32", "1", "Mean weights of each patch"),
+    "bounce_albedo": ArrayPart(("patch", "channel"), "float32", "1", "Mean reflectance, linear"),
+    "bounce_samples": ArrayPart(
+        ("patch", "sample"), "int32", "1", "Rows of the SSDFs that tell how each patch is lit"
+    ),
+}
+
 PACKAGE = PackageSchema(
     "ssdf_lighting",
     1,
@@ -149,6 +168,7 @@ PACKAGE = PackageSchema(
             optional=True,
         ),
         **_PAPERS_FORM,
+        **_BOUNCE,
         "light_axes": ArrayPart(("light", "axis"), "float32", "1", "Unit vectors to the lights"),
         "light_sharpness": ArrayPart(("light",), "float32", "1", "λ of the lights"),
         "light_amplitudes": ArrayPart(
@@ -167,6 +187,7 @@ PACKAGE = PackageSchema(
         "background": Parameter("1", "Linear radiance where no surface is, before the exposure"),
         "rmse": Parameter("radian", "Error of d by the compression, weighted by solid angle"),
         "irradiance_error": Parameter("1", "Relative RMS error of the lights' irradiance"),
+        "shadowed_error": Parameter("1", "The same behind random occluders"),
     },
     _DECODING,
 )

@@ -208,6 +208,23 @@ SSDF_BASIS = Schema(
     },
 )
 
+BOUNCE_FACTORS = Schema(
+    _SYSTEM,
+    "bounce_factors",
+    1,
+    "Form factors from vertices to patches of the surfaces, as a product of small matrices.",
+    {
+        "codes": Variable(("vertex", "factor"), "int8", "1", "Weights of each vertex, over steps"),
+        "steps": Variable(("factor",), "float32", "1", "What a code of 1 stands for"),
+        "vectors": Variable(("factor", "patch"), "float32", "1", "What is weighted"),
+        "between": Variable(("patch", "factor"), "float32", "1", "Mean weights of each patch"),
+        "albedo": Variable(("patch", "channel"), "float32", "1", "Mean reflectance, linear"),
+        "samples": Variable(
+            ("patch", "sample"), "int32", "1", "Vertices that tell how each patch is lit"
+        ),
+    },
+)
+
 ENVIRONMENT_LIGHTS = Schema(
     _SYSTEM,
     "environment_lights",
@@ -218,7 +235,7 @@ ENVIRONMENT_LIGHTS = Schema(
             ("row", "column", "channel"),
             "float32",
             "1",
-            "The environment, equirectangular, z up, averaged down",
+            "The environment, equirectangular, z up, averaged down to 1024 rows at most",
         ),
         "axes": Variable(("light", "axis"), "float64", "1", "p, unit vectors to the lights"),
         "sharpness": Variable(("light",), "float64", "1", "λ"),
@@ -226,6 +243,9 @@ ENVIRONMENT_LIGHTS = Schema(
         "error": Variable((), "float64", "1", "Relative RMS error of radiance"),
         "tone_error": Variable((), "float64", "1", "Relative RMS error of log(1 + L / mean)"),
         "irradiance_error": Variable((), "float64", "1", "Relative RMS error of irradiance"),
+        "shadowed_error": Variable(
+            (), "float64", "1", "Relative RMS error of irradiance behind random occluders"
+        ),
         "flux_error": Variable((), "float64", "1", "Relative error of the radiance's integral"),
     },
 )
@@ -244,8 +264,14 @@ RELIT_FRAMES = Schema(
         "uncompressed": Variable(
             ("y", "x", "channel"), "uint8", "1", "The first frame from SSDFs not compressed"
         ),
+        "direct": Variable(
+            ("y", "x", "channel"), "uint8", "1", "The first frame without reflected light"
+        ),
         "reference": Variable(
-            ("y", "x", "channel"), "uint8", "1", "The first frame, traced with rays to the same SGs"
+            ("y", "x", "channel"),
+            "uint8",
+            "1",
+            "As `direct`, traced under the environment itself",
         ),
         "clusters": Variable(
             ("y", "x", "channel"), "uint8", "1", "Clusters in colours", "figure 2"
@@ -268,6 +294,7 @@ SCHEMAS = (
     SSDF_MATRIX,
     TRIANGLE_CLUSTERS,
     SSDF_BASIS,
+    BOUNCE_FACTORS,
     ENVIRONMENT_LIGHTS,
     RELIT_FRAMES,
     LIT_PACKAGE,

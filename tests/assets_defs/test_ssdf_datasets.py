@@ -21,6 +21,7 @@ from pipelines.ssdf_lighting.distances.signed_distance import distances_to_sampl
 from pipelines.ssdf_lighting.distances.visibility import scene_visibility, unpacked
 from pipelines.ssdf_lighting.figures import CompressionErrors
 from pipelines.ssdf_lighting.light.environment_fit import Fit
+from pipelines.ssdf_lighting.light.fit_quality import FitErrors
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import Scene, built_in_scene
 from pipelines.ssdf_lighting.surface_textures import SurfaceTextures, Texture, TexturedMaterial
@@ -146,7 +147,7 @@ def test_both_forms_decode_as_they_did(scene: Scene, matrix: NDArray[np.float32]
 def test_lights_come_back() -> None:
     random = np.random.default_rng(0)
     lights = Lights(random.normal(size=(3, 3)), random.uniform(1, 9, 3), random.random((3, 3)))
-    fit = Fit(lights, 0.3, 0.2, 0.1)
+    fit = Fit(lights, FitErrors(0.3, 0.2, 0.1, 0.15))
     radiance = random.random((4, 8, 3))
     dataset = schemas.ENVIRONMENT_LIGHTS.conform(
         datasets.lights_dataset(radiance, fit, 1e-9, "hall.hdr")

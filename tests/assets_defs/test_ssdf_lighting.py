@@ -27,8 +27,14 @@ from pipelines.ssdf_lighting.compression.compact_memory import (
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.distances import refined, visibility
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
-from pipelines.ssdf_lighting.drawing import finishes, frames, live_parts, viewpoints
-from pipelines.ssdf_lighting.light import environment_fit
+from pipelines.ssdf_lighting.drawing import (
+    bounced_light,
+    finishes,
+    frames,
+    live_parts,
+    viewpoints,
+)
+from pipelines.ssdf_lighting.light import environment_fit, fit_quality, interreflection
 from pipelines.ssdf_lighting.light.spherical_gaussians import rotated
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
@@ -271,13 +277,21 @@ def _upside_down(right: Callable[..., Any], *arguments: Any, **options: Any) -> 
 
 def _turned(right: Callable[..., Any], radiance: Any, *arguments: Any, **options: Any) -> Any:
     fit = right(radiance, *arguments, **options)
-    return environment_fit.evaluate_fit(rotated(fit.lights, 70.0), radiance)
+    turned = rotated(fit.lights, 70.0)
+    return fit._replace(lights=turned, errors=fit_quality.fit_errors(turned, radiance))
 
 
-def _wrong_lights(
-    right: Callable[..., Any], lit: Any, lights: Any, *arguments: Any, **options: Any
-) -> Any:
-    return right(lit, rotated(lights, 120.0), *arguments, **options)
+def _wrong_probe(right: Callable[..., Any], radiance: Any) -> Any:
+    return right(np.roll(radiance, radiance.shape[1] // 3, axis=1))
+
+
+def _half_factors(right: Callable[..., Any], *arguments: Any) -> Any:
+    made = right(*arguments)
+    return made._replace(steps=made.steps / 2)
+
+
+def _darkness(right: Callable[..., Any], factors: Any, direct: Any) -> Any:
+    return right(factors, 0 * direct)
 
 
 def _without_colours(right: Callable[..., Any], *arguments: Any) -> Any:
@@ -316,11 +330,13 @@ REGRESSIONS = (
     Regression("wrong_visibility", Decoder, "distances", _raised, SCENE),
     Regression("seam_ratio", compact, "quantise_to_rmse", _uneven, SCENE),
     Regression("flux_error", environment_fit, "fit_lights", _bright, SKY),
-    Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
+    Regression("closure_error", interreflection, "bounce_factors", _half_factors, SCENE),
+    Regression("shadowed_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("share_from_above", built_in_environments, "sky", _upside_down, SKY),
     Regression("relit_psnr", Decoder, "distances_along", _stepping, KEYS),
-    Regression("reference_psnr", frames, "traced_reference", _wrong_lights, KEYS),
+    Regression("probe_psnr", frames, "ProbeSource", _wrong_probe, KEYS),
+    Regression("reflected_light", bounced_light, "bounced", _darkness, KEYS),
     Regression("colour_error", finishes, "_material_rows", _without_red, KEYS),
     Regression("coverage", viewpoints, "scene_camera", _far_camera, KEYS),
     Regression(

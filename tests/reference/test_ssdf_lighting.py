@@ -17,6 +17,7 @@ from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.rays import build_scene, first_hits
 from pipelines.geometry.shapes import sphere, square
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
+from pipelines.ssdf_lighting.drawing.light_sources import GaussianSource
 from pipelines.ssdf_lighting.drawing.ray_tracing import ray_traced
 from pipelines.ssdf_lighting.light.shading import Materials
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate
@@ -78,7 +79,9 @@ def traced(materials: Materials) -> tuple[Array, Array]:
         materials,
     )
     return mean_and_error(
-        ray_traced(mesh, lights(), CAMERA, SIZE, SAMPLES, seed=seed).radiance[..., :3]
+        ray_traced(mesh, GaussianSource(lights()), CAMERA, SIZE, SAMPLES, seed=seed).radiance[
+            ..., :3
+        ]
         for seed in range(RUNS)
     )
 

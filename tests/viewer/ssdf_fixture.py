@@ -14,13 +14,17 @@ import numpy as np
 
 from assets_defs.workspace import CHECKOUT
 from pipelines.light.built_in_environments import sky
+from pipelines.light.environment_maps import texel_directions
 from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
 from pipelines.ssdf_lighting.light.cosine_lobes import cosine_lobes
-from pipelines.ssdf_lighting.light.environment_fit import downsampled, fit_lights
+from pipelines.ssdf_lighting.light.environment_fit import fit_lights
+from pipelines.ssdf_lighting.light.interreflection import BounceFactors, bounced
+from pipelines.ssdf_lighting.light.sphere_maps import downsampled
+from pipelines.ssdf_lighting.light.suns import split_suns
 
 NAME = "ssdf_lighting.json"
 _SIDE = 8
@@ -61,8 +65,40 @@ def values(file: bytes) -> dict[str, Any]:
         "environment": environment.ravel().tolist(),
         "irradiance_error": fit_lights(
             environment, 6, least_sharpness=3.0, most_sharpness=300.0
-        ).irradiance_error,
+        ).errors.irradiance_error,
+        "suns": _suns(),
+        "bounce": _bounce(),
     }
+
+
+def _suns() -> dict[str, Any]:
+    """Two discs, the smaller one brighter, and what is found of them."""
+    height, discs = 90, [[40.0, 30.0, 2.2, 900.0], [-100.0, 50.0, 1.6, 2000.0]]
+    ways = texel_directions(height)
+    radiance = np.full((height, 2 * height, 3), 0.5)
+    for azimuth, elevation, radius, value in np.radians(discs) * [1, 1, 1, 180 / np.pi]:
+        level = np.cos(elevation)
+        axis = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
+        radiance[ways @ np.array(axis) > np.cos(radius)] += value * np.array([1.0, 0.8, 0.5])
+    suns = split_suns(radiance, 4).suns
+    return {"height": height, "discs": discs, **{k: v.tolist() for k, v in suns._asdict().items()}}
+
+
+def _bounce() -> dict[str, Any]:
+    """Small form factors, and what they make of light."""
+    random = np.random.default_rng(3)
+    factors = BounceFactors(
+        random.integers(-20, 100, (6, 3)).astype(np.int8),
+        np.array([0.002, 0.001, 0.003], np.float32),
+        random.uniform(0.0, 0.5, (3, 4)).astype(np.float32),
+        random.uniform(0.0, 0.4, (4, 3)).astype(np.float32),
+        random.uniform(0.1, 0.8, (4, 3)).astype(np.float32),
+        np.zeros((4, 2), np.int32),
+    )
+    direct = random.uniform(0.0, 2.0, (4, 2, 3))
+    parts = {name: part.ravel().tolist() for name, part in factors._asdict().items()}
+    found = bounced(factors, direct)
+    return {**parts, "direct": direct.ravel().tolist(), "found": found.ravel().tolist()}
 
 
 def _digest(*arrays: Any) -> str:

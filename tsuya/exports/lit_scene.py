@@ -24,7 +24,8 @@ distances.npz  the signed distances as ssdf_lookup.glsl reads them, texels of fo
                SIDE of its n x n directions.
 lights.npz     the environment as spherical Gaussians: axes, sharpness, amplitudes.
 glsl/          lit_distances.glsl finds the distances of all lobes at a vertex, lit_vertex.glsl with
-               EDGES_FETCHED hands them on, lit_fragment.glsl makes the light of a pixel. Names in
+               EDGES_FETCHED hands them on, lit_fragment.glsl makes the light of a pixel
+               (bounced: reflected light of a vertex, zeros for none). Names in
                capitals are constants; #include takes the file of that name. z is up in the arrays:
                the scene's node turns it to y.
 """

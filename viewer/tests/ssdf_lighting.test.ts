@@ -7,10 +7,12 @@ import { clusterColour } from "../src/systems/ssdf_lighting/clusters";
 import { readCompactFile } from "../src/systems/ssdf_lighting/compact_file";
 import { tablesOfCodes, tablesOfPaper, type DistanceTables } from "../src/systems/ssdf_lighting/distance_tables";
 import { fitLights, integral } from "../src/systems/ssdf_lighting/environment_fit";
+import { bounced } from "../src/systems/ssdf_lighting/interreflection";
 import { Matrix, nonnegative, solved } from "../src/systems/ssdf_lighting/least_squares";
 import { COLUMNS, FINE, mattTables, scaledBessel0, scaledBessel1 } from "../src/systems/ssdf_lighting/lobe_tables";
 import { readRadiance } from "../src/systems/ssdf_lighting/probe_files";
 import { Sphere, downsampled } from "../src/systems/ssdf_lighting/sphere_map";
+import { splitSuns } from "../src/systems/ssdf_lighting/suns";
 
 const known = JSON.parse(readFileSync(new URL("./ssdf_lighting.json", import.meta.url), "utf8"));
 const file = new Uint8Array(Buffer.from(known.file, "base64"));
@@ -118,6 +120,54 @@ describe("the fit", () => {
       before.forEach((flux, channel) => expect(after[channel] / flux).toBeCloseTo(1, 9));
     }
   });
+});
+
+describe("suns", () => {
+  const { height, discs, axes, sharpness, amplitudes } = known.suns;
+  const { ways, count } = new Sphere(height);
+  const data = new Float64Array(3 * count).fill(0.5);
+  for (const [azimuth, elevation, radius, value] of discs as number[][]) {
+    const [a, e] = [(azimuth * Math.PI) / 180, (elevation * Math.PI) / 180];
+    const axis = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
+    for (let p = 0; p < count; p++) {
+      const cosine = axis.reduce((sum, part, c) => sum + part * ways[3 * p + c], 0);
+      if (cosine <= Math.cos((radius * Math.PI) / 180)) continue;
+      [1, 0.8, 0.5].forEach((tint, channel) => (data[3 * p + channel] += value * tint));
+    }
+  }
+
+  it("are found where and as wide as by Python, and leave nothing behind", () => {
+    const { suns, rest } = splitSuns({ height, data }, 4);
+    expect(suns.length).toBe(sharpness.length);
+    suns.forEach((sun, k) => {
+      sun.axis.forEach((value, c) => expect(value).toBeCloseTo(axes[k][c], 9));
+      expect(sun.sharpness / sharpness[k]).toBeCloseTo(1, 6);
+      sun.amplitude.forEach((value, c) => expect(value / amplitudes[k][c]).toBeCloseTo(1, 6));
+    });
+    expect(Math.max(...rest)).toBeCloseTo(0.5, 9);
+  });
+
+  it("are as many as asked for, brightest first", () => {
+    const { suns, rest } = splitSuns({ height, data }, 1);
+    expect(suns.length).toBe(1);
+    expect(Math.max(...rest)).toBeCloseTo(900.5, 6);
+  });
+});
+
+it("gathers reflected light as Python does", () => {
+  const { codes, steps, vectors, between, albedo, samples, direct, found } = known.bounce;
+  const factors = {
+    codes: Int8Array.from(codes),
+    steps: Float32Array.from(steps),
+    vectors: Float32Array.from(vectors),
+    between: Float32Array.from(between),
+    albedo: Float32Array.from(albedo),
+    samples: Int32Array.from(samples),
+  };
+  const light = bounced(factors, Float64Array.from(direct));
+  light.forEach((value, k) => expect(value).toBeCloseTo(found[k], 5));
+  expect(Math.max(...light)).toBeGreaterThan(0.1);
+  expect(bounced(factors, new Float64Array(direct.length)).every((value) => value === 0)).toBe(true);
 });
 
 it("solves systems, with and without signs", () => {

@@ -13,6 +13,7 @@ uniform sampler2D matt;                // a row for each light: lobes from behin
 uniform sampler2D gloss;               // a row for each material: lobes by the view's cosine
 #endif
 in vec3 shadingOut;
+in vec3 bouncedOut;
 in vec3 placeOut;
 #if TEXTURED
 uniform vec4 factors;                  // base colour, metalness
@@ -121,7 +122,7 @@ Gloss seenGloss(Look look) {
 
 vec3 surfaceColour() {
   Look look = seenLook();
-  vec3 lit = vec3(0.0);
+  vec3 lit = bouncedOut;
 #pragma unroll_loop_start
   for (int i = 0; i < LIGHTS; i++) {
     float column = dot(look.normal, light(i).xyz) * MATT_HALF + (MATT_HALF + 0.5);

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
+from pipelines.ssdf_lighting.drawing.bounced_light import BouncedLight
+from pipelines.ssdf_lighting.drawing.light_sources import LightSource, ProbeSource
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor
+from pipelines.ssdf_lighting.light.interreflection import BounceFactors
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
 
@@ -48,22 +51,26 @@ def draw_turning_light(
     progress: Progress = lambda fraction: None,
     *,
     supersampling: int = 1,
+    bounce: BounceFactors | None = None,
 ) -> TurningLight:
     """Draw the scene for each turn (degrees about up) of its lights.
 
-    ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3).
+    ``distances_along`` tells d (P, L) of vertices (P,) along axes (P, L, 3). With ``bounce`` the
+    scene's surfaces light each other, too.
     """
     split = split_by_part(scene)
     actor = LitActor(split.mesh, lights)
+    reflected = None if bounce is None else BouncedLight(scene, bounce, lights)
     pictures, seconds = [], []
     with Stage(*size, background=BACKGROUND, supersampling=supersampling) as stage:
         stage.add(*actor.actors)
         stage.look(camera)
         for number, turn in enumerate(turns):
             begin = time.perf_counter()
-            actor.relight(
-                camera, rotated(lights, turn), lambda axes: distances_along(split.source, axes)
-            )
+            turned = rotated(lights, turn)
+            actor.relight(camera, turned, lambda axes: distances_along(split.source, axes))
+            if reflected is not None:
+                actor.show_bounced(reflected.at_vertices(turned, distances_along)[split.source])
             stage.draw()
             seconds.append(time.perf_counter() - begin)
             pictures.append(stage.radiance())
@@ -75,7 +82,7 @@ def draw_turning_light(
 
 def traced_reference(
     scene: Scene,
-    lights: Lights,
+    source: LightSource,
     camera: Camera,
     size: tuple[int, int],
     samples: int,
@@ -83,10 +90,10 @@ def traced_reference(
     seed: int = 0,
     progress: Progress = lambda fraction: None,
 ) -> Traced:
-    """The same picture by rays towards the same lights, none of the method's shortcuts."""
+    """The same picture of direct light by rays, none of the method's shortcuts."""
     return ray_traced(
         split_by_part(scene).mesh,
-        lights,
+        source,
         camera,
         size,
         samples,
@@ -100,13 +107,15 @@ class RelitFrames(NamedTuple):
     """A scene under turning light with what it is compared with, 8-bit sRGB (…, H, W, 3) at one
     exposure.
 
-    frames: (frames, H, W, 3); uncompressed, reference: the first of them, of the SSDFs before
-    compression and traced.
+    frames: (frames, H, W, 3), with light that surfaces reflect.
+    uncompressed, direct, reference: the first of them of the SSDFs before compression; without
+    reflected light; and that by rays under the environment itself.
     exposure: what radiance was multiplied by. turning: the frames' radiance, times and renderer.
     """
 
     frames: NDArray[np.uint8]
     uncompressed: NDArray[np.uint8]
+    direct: NDArray[np.uint8]
     reference: NDArray[np.uint8]
     exposure: float
     turning: TurningLight
@@ -119,9 +128,17 @@ class ComparedDistances(NamedTuple):
     uncompressed: DistancesAlong
 
 
+class Illumination(NamedTuple):
+    """Lights, the environment (H, 2 H, 3) that they stand for, and the scene's form factors."""
+
+    lights: Lights
+    environment: NDArray[np.floating]
+    bounce: BounceFactors
+
+
 def relit_frames(
     scene: Scene,
-    lights: Lights,
+    light: Illumination,
     distances: ComparedDistances,
     camera: Camera,
     size: tuple[int, int],
@@ -131,22 +148,23 @@ def relit_frames(
 ) -> RelitFrames:
     """Draw every turn (degrees) of the lights; of the first also what it is compared with.
 
-    ``samples`` >= 2, rays a pixel of the traced picture. Raises ValueError as ``LitActor``.
+    ``samples`` >= 2, rays a pixel of the traced picture; ``turns`` begin with 0, as the environment
+    is given. Raises ValueError as ``LitActor`` and ``ProbeSource``.
     """
-    turning = draw_turning_light(
-        scene,
-        lights,
-        distances.compressed,
-        camera,
-        size,
-        turns,
-        lambda fraction: progress(0.3 * fraction),
-    )
-    exact = draw_turning_light(scene, lights, distances.uncompressed, camera, size, turns[:1])
+
+    def drawn(along: DistancesAlong, count: int, bounce: BounceFactors | None) -> TurningLight:
+        return draw_turning_light(
+            scene, light.lights, along, camera, size, turns[:count], bounce=bounce
+        )
+
+    turning = drawn(distances.compressed, len(turns), light.bounce)
+    progress(0.3)
+    exact = drawn(distances.uncompressed, 1, light.bounce)
+    direct = drawn(distances.compressed, 1, None)
     progress(0.4)
     reference = traced_reference(
         scene,
-        lights,
+        ProbeSource(light.environment),
         camera,
         size,
         samples,
@@ -157,6 +175,7 @@ def relit_frames(
     return RelitFrames(
         exposed(turning.radiance, scale),
         exposed(exact.radiance[0], scale),
+        exposed(direct.radiance[0], scale),
         exposed(reference[..., :3] + backdrop, scale),
         scale,
         turning,

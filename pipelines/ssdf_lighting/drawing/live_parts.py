@@ -20,6 +20,8 @@ from pipelines.ssdf_lighting.drawing.frames import (
 )
 from pipelines.ssdf_lighting.drawing.stage_view import all_gloss_lobes, rows_of_lobes
 from pipelines.ssdf_lighting.light.gloss_lobes import gloss_lobes
+from pipelines.ssdf_lighting.light.interreflection import BounceFactors
+from pipelines.ssdf_lighting.light.sphere_maps import downsampled
 from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import Scene, split_by_part
 
@@ -29,6 +31,8 @@ TURNS = (0.0, 120.0)
 """Degrees, of the reference views."""
 SUPERSAMPLING = 2
 """Of the reference views."""
+SHOWN_ROWS = 64
+"""Of the environment that a package holds, at most."""
 _LARGEST_HALF = 65504.0
 
 
@@ -83,6 +87,11 @@ def gloss_table(scene: Scene) -> Floats:
     return np.stack(rows, axis=-1).astype(np.float32)
 
 
+def shown_environment(radiance: NDArray[np.floating]) -> NDArray[np.float16]:
+    """An environment (H, 2 H, 3) with few rows, as halfs: what is seen behind the scene."""
+    return halfs(downsampled(radiance, min(len(radiance), SHOWN_ROWS)).astype(np.float32))
+
+
 def halfs(radiance: NDArray[np.floating]) -> NDArray[np.float16]:
     """Radiance as halfs; what these cannot hold becomes their largest."""
     return np.minimum(radiance, _LARGEST_HALF).astype(np.float16)
@@ -106,13 +115,21 @@ def reference_views(
     camera: Camera,
     size: tuple[int, int],
     exposure: float,
+    bounce: BounceFactors,
 ) -> list[ReferenceView]:
     """The scene at two turns of its lights, without shadows, and its clusters; ``size`` is (width,
-    height), ``cluster`` (F,)."""
+    height), ``cluster`` (F,). All are with reflected light."""
 
     def drawn(distances: DistancesAlong, turns: tuple[float, ...]) -> NDArray[np.uint8]:
         turning = draw_turning_light(
-            scene, lights, distances, camera, size, turns, supersampling=SUPERSAMPLING
+            scene,
+            lights,
+            distances,
+            camera,
+            size,
+            turns,
+            supersampling=SUPERSAMPLING,
+            bounce=bounce,
         )
         return exposed(turning.radiance, exposure)
 
@@ -136,11 +153,19 @@ def poster(
     camera_of: Callable[[float], Camera],
     width: int,
     exposure: float,
+    bounce: BounceFactors,
 ) -> NDArray[np.uint8]:
     """The scene at 4 : 3, smooth; ``camera_of`` makes the camera of an aspect."""
     size = (width, width * 3 // 4)
     turning = draw_turning_light(
-        scene, lights, distances_along, camera_of(4 / 3), size, TURNS[:1], supersampling=2
+        scene,
+        lights,
+        distances_along,
+        camera_of(4 / 3),
+        size,
+        TURNS[:1],
+        supersampling=2,
+        bounce=bounce,
     )
     return exposed(turning.radiance[0], exposure)
 

@@ -27,11 +27,13 @@ def render_numpy(
     lights: Lights,
     camera: Camera,
     size: tuple[int, int],
+    bounced: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float64]:
     """Linear radiance and coverage (height, width, 4) float64, row 0 at the top.
 
     ``size`` is (width, height). One ray through each pixel's middle; normals and the vertices'
-    distances are interpolated by barycentric weights; textures are not looked at. Raises ValueError
+    distances are interpolated by barycentric weights; textures are not looked at. ``bounced``
+    (V, 3) is what albedo 1 would show of light that other surfaces reflect. Raises ValueError
     as ``build_scene`` and ``lobe_tables``.
     """
     points, corners, shading, material, materials, _ = mesh
@@ -60,6 +62,9 @@ def render_numpy(
         )
         between = np.einsum("pk,pkl->pl", weight, distances[corner])
         picture[block, :3] = shaded(found, between, shares)
+        if bounced is not None:
+            reflected = np.einsum("pk,pkc->pc", weight, bounced[corner])
+            picture[block, :3] += materials.albedo[material[corner[:, 0]]] * reflected
         picture[block, 3] = 1.0
     width, height = size
     return picture.reshape(height, width, 4)

@@ -1,6 +1,6 @@
-"""Ground truth of the shading: the same lights and materials, visibility by rays.
+"""Ground truth of the shading: the same materials, visibility by rays, the probe itself for light.
 
-Direct light only, as the shading has it. Directions are drawn from all lights, from the cosine and
+Direct light only. Directions are drawn from the light, from the cosine and
 from Beckmann's half vectors at once, and weighted by the sum of these densities (Veach's balance
 heuristic, one sample at a time): no sample is much brighter than the pixel.
 """
@@ -18,8 +18,8 @@ from pipelines.drawing.stage import Camera
 from pipelines.geometry.rays import build_scene, first_hits, occluded
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.drawing.hit_looks import HitLooks
+from pipelines.ssdf_lighting.drawing.light_sources import LightSource, about
 from pipelines.ssdf_lighting.light.microfacets import beckmann, check_materials, gloss
-from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
 from pipelines.ssdf_lighting.scene import LitMesh
 from pipelines.ssdf_lighting.surface_textures import Looks
 
@@ -30,7 +30,6 @@ FloatArray = NDArray[np.float64]
 
 _OFF_SURFACE = 1e-4  # of the triangle's size
 _LIGHTS_PART = 0.5  # of the samples
-_LEAST_FACING = 0.02
 _AT_ONCE = 1 << 17  # samples in memory together
 
 
@@ -64,7 +63,7 @@ class _Spots(NamedTuple):
 
 def ray_traced(
     mesh: LitMesh,
-    lights: Lights,
+    source: LightSource,
     camera: Camera,
     size: tuple[int, int],
     samples: int,
@@ -97,7 +96,7 @@ def ray_traced(
         u = _spread(len(middles[block]), samples, rng)
         spread = places + u[:, 4:] - 0.5
         rays = camera_rays(camera, size, spread if jittered else places)
-        light, hit = _sampled(scene, surface, lights, rays, spread, u[:, :4])
+        light, hit = _sampled(scene, surface, source, rays, spread, u[:, :4])
         light = light.reshape(-1, samples, 3)
         picture[block, :3] = light.mean(axis=1)
         picture[block, 3] = hit.reshape(-1, samples).mean(axis=1)
@@ -127,7 +126,7 @@ def _surface(mesh: LitMesh, looks: HitLooks) -> _Surface:
 def _sampled(
     scene: RaycastingScene,
     surface: _Surface,
-    lights: Lights,
+    source: LightSource,
     rays: tuple[FloatArray, FloatArray],
     places: FloatArray,
     u: FloatArray,
@@ -153,7 +152,7 @@ def _sampled(
         -ways[hit],
         looks,
     )
-    way, density, glow = _drawn(spots, lights, u[hit])
+    way, density, glow = _drawn(spots, source, u[hit])
     reflected = _reflected(spots, way)
     above = (np.sum(way * spots.facing, axis=1) > 0) & (reflected > 0).any(axis=1)
     above[above] = ~occluded(scene, spots.at[above], way[above])
@@ -162,45 +161,31 @@ def _sampled(
 
 
 def _drawn(
-    spots: _Spots, lights: Lights, u: FloatArray
+    spots: _Spots, source: LightSource, u: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Directions (S, 3), their density (S,) per steradian, and the radiance (S, 3) from there."""
     roughness = spots.looks.roughness
     gloss_part = np.where(spots.looks.specular > 0, (1 - _LIGHTS_PART) / 2, 0.0)
     matt_part = 1 - _LIGHTS_PART - gloss_part
-    whole = integral(lights.sharpness)
-    # Lights that are below the horizon by their own width are hardly worth a sample.
-    width = np.minimum(1.5 / np.sqrt(lights.sharpness), 1.0)
-    facing = np.maximum((spots.normal @ lights.axes.T + width) / (1 + width), _LEAST_FACING)
-    chances = facing * (lights.amplitudes.mean(axis=1) * whole + 1e-30)
-    chances /= chances.sum(axis=1, keepdims=True)
-
-    chosen = np.sum(np.cumsum(chances, axis=1) < u[:, 3:], axis=1)
-    chosen = np.minimum(chosen, len(whole) - 1)
     by_light = u[:, 2] < _LIGHTS_PART
     by_gloss = u[:, 2] >= 1 - gloss_part
-    sharp = lights.sharpness[chosen]
-    around_light = 1 + np.log1p(u[:, 0] * np.expm1(-2 * sharp)) / sharp
     slope = roughness * np.sqrt(-np.log1p(-u[:, 0]))
-    cosine = np.where(
-        by_light, around_light, np.where(by_gloss, 1 / np.hypot(1, slope), np.sqrt(u[:, 0]))
-    )
-    pole = np.where(by_light[:, None], lights.axes[chosen], spots.normal)
-    way = _about(pole, cosine, 2 * math.pi * u[:, 1])
+    cosine = np.where(by_gloss, 1 / np.hypot(1, slope), np.sqrt(u[:, 0]))
+    way = about(spots.normal, cosine, 2 * math.pi * u[:, 1])
     o_h = np.sum(way * spots.view, axis=1, keepdims=True)
     way = np.where(by_gloss[:, None], 2 * o_h * way - spots.view, way)
+    way[by_light] = source.drawn(spots.normal[by_light], u[by_light][:, [0, 1, 3]])
 
-    lobes = np.exp(lights.sharpness * (way @ lights.axes.T - 1))
     half = _unit(way + spots.view)
     n_h, o_h = (np.sum(half * other, axis=1) for other in (spots.normal, spots.view))
     n_i = np.sum(way * spots.normal, axis=1)
     mirrored = np.where(n_h > 0, beckmann(n_h, roughness) * n_h / (4 * np.maximum(o_h, 1e-6)), 0.0)
     density = (
-        _LIGHTS_PART * np.sum(chances / whole * lobes, axis=1)
+        _LIGHTS_PART * source.density(spots.normal, way)
         + matt_part * np.maximum(n_i, 0) / math.pi
         + gloss_part * mirrored
     )
-    return way, density, lobes @ lights.amplitudes
+    return way, density, source.radiance(way)
 
 
 def _reflected(spots: _Spots, way: FloatArray) -> FloatArray:
@@ -217,19 +202,6 @@ def _reflected(spots: _Spots, way: FloatArray) -> FloatArray:
     )
     matt = spots.looks.albedo / math.pi * np.maximum(n_i, 0.0)[:, None]
     return matt + shine[:, None] * spots.looks.tint
-
-
-def _about(pole: FloatArray, cosine: FloatArray, azimuth: FloatArray) -> FloatArray:
-    """Unit vectors (S, 3) at these angles to poles (S, 3); Duff et al. 2017's tangents."""
-    x, y, z = pole.T
-    sign = np.copysign(1.0, z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    one = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    other = np.stack([b, sign + y * y * a, -y], axis=1)
-    sine = np.sqrt(np.maximum(1 - cosine**2, 0.0))
-    along, across = sine * np.cos(azimuth), sine * np.sin(azimuth)
-    return along[:, None] * one + across[:, None] * other + cosine[:, None] * pole
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

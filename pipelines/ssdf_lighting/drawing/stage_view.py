@@ -33,7 +33,8 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
 from pipelines.ssdf_lighting.scene import LitMesh
 
 MOST_LIGHTS = 24
-"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes."""
+"""Two lobes a light, four distances an attribute: 12 of OpenGL's 16 attributes, and position,
+normal, bounced light and one or two of the material."""
 _FINE = 2048
 """Steps of n·p in the shader's table of the matt part: the nearest is taken, no two are mixed."""
 
@@ -107,6 +108,14 @@ class LitActor:
         for part in self._parts:
             part.show_distances(distances)
 
+    def show_bounced(self, light: NDArray[np.floating]) -> None:
+        """Add light that other surfaces reflect: (V, 3), what albedo 1 would show of it."""
+        expected = (len(self._points), 3)
+        if light.shape != expected:
+            raise ValueError(f"bounced light: found shape {light.shape}, expected {expected}.")
+        for part in self._parts:
+            part.show_bounced(light)
+
     def _set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         for part in self._parts:
             part.set_lights(seen_from, lights)
@@ -157,8 +166,7 @@ class _Part:
             points[self._chosen],
             corners.reshape(-1, 3),
             attributes={
-                "shading": normals[self._chosen],
-                **{name: values[self._chosen] for name, values in finish.attributes.items()},
+                **_packed(normals[self._chosen], finish, self._chosen),
                 # Each its own: the mesh keeps them, and they are written to.
                 **{name: np.zeros((len(self._chosen), 4), np.float32) for name in names},
             },
@@ -175,6 +183,8 @@ class _Part:
             lit=False,
         )
         self._arrays, self._edges = _arrays_of(self.actor, names)
+        self._normals = normals[self._chosen]
+        self._room = ["shading", "paint"] if "paint" in finish.attributes else ["bounced"]
         self._uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
         for name, values in finish.uniforms.items():
             self._uniforms.SetUniform4f(name, values)
@@ -193,11 +203,35 @@ class _Part:
             values[:, :width] = distances[self._chosen, first : first + width]
             array.Modified()
 
+    def show_bounced(self, light: NDArray[np.floating]) -> None:
+        chosen = light[self._chosen]
+        arrays, values = _arrays_of(self.actor, self._room)
+        if len(values) == 1:
+            values[0][:] = chosen
+        else:
+            values[0][:, :3] = self._normals * (1.0 + chosen[:, 2:])
+            values[0][:, 3], values[1][:, 3] = chosen[:, 0], chosen[:, 1]
+        for array in arrays:
+            array.Modified()
+
     def set_lights(self, seen_from: NDArray[np.float64], lights: Lights) -> None:
         rows = np.column_stack([lights.axes, lights.sharpness])
         self._uniforms.SetUniform4f("eye", seen_from.tolist())
         for name, values in (("lights", rows), ("amplitudes", lights.amplitudes)):
             self._uniforms.SetUniform1fv(name, values.size, values.ravel().tolist())
+
+
+def _packed(
+    normals: NDArray[np.float32], finish: Finish, chosen: NDArray[np.integer]
+) -> dict[str, NDArray[Any]]:
+    """Attributes besides the distances, with room for reflected light: see lit_vertex.glsl."""
+    others = {name: values[chosen] for name, values in finish.attributes.items()}
+    none = np.zeros((len(chosen), 3), np.float32)
+    if "paint" not in others:
+        return {"shading": normals, "bounced": none, **others}
+    with_room = {"shading": normals, "paint": others.pop("paint").astype(np.float32)}
+    packed = {name: np.hstack([values, none[:, :1]]) for name, values in with_room.items()}
+    return {**packed, **others}
 
 
 def draw_lit(
@@ -247,7 +281,7 @@ def _memory_of(made: Any) -> NDArray[np.float32]:
 
 
 def _arrays_of(actor: Any, names: list[str]) -> tuple[list[Any], list[NDArray[np.float32]]]:
-    """The named vertex attributes, and their values (V, 4); writing changes them."""
+    """The named vertex attributes, and their values (V, k); writing changes them."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     points = actor.GetMapper().GetInput().GetPointData()

@@ -1,14 +1,17 @@
 """A map of radiance as a sum of a few spherical Gaussians.
 
-Least squares of radiance would see a sun and nothing else; of relative radiance they would rather
-lose the sun than let some of it spill into the sky around. So the map is blurred first, by an SG
-of sharpness 100: a sun keeps its flux and loses its edge. Differences are weighed by
+Suns are taken out first, each a Gaussian of its own with its flux, place and width (:mod:`.suns`):
+their shadows have edges, and a blurred map has not.
+
+The rest: least squares of radiance would see windows and nothing else. So the map is blurred, by
+an SG of sharpness 100: a lamp keeps its flux and loses its edge. Differences are weighed by
 1 / sqrt(radiance + mean), blurred too. An SG blurred by an SG is one again, nearly: 1 / λ add up.
 What comes out sharper than it may be is made as wide as it must, and keeps its flux.
 
 Lights are placed one by one where they help most (matching pursuit) and refined together after
 each, by Levenberg and Marquardt's method. At last their amplitudes follow from nonnegative least
-squares with the map's flux given.
+squares of what counts, the irradiance behind random occluders (:mod:`.fit_quality`), with the
+map's flux given.
 """
 
 from __future__ import annotations
@@ -24,7 +27,15 @@ from scipy.spatial.transform import Rotation
 
 from pipelines.drawing.colour import luminance
 from pipelines.light.environment_maps import check_environment, solid_angles, texel_directions
-from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, evaluate, integral
+from pipelines.ssdf_lighting.light.fit_quality import (
+    HEIGHT,
+    FitErrors,
+    fit_errors,
+    occluded_cosines,
+)
+from pipelines.ssdf_lighting.light.sphere_maps import blurred, downsampled, fluxes
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
+from pipelines.ssdf_lighting.light.suns import split_suns
 
 FloatArray = NDArray[np.float64]
 
@@ -33,38 +44,30 @@ LEAST_SHARPNESS = 0.5
 MOST_SHARPNESS = 1000.0
 """Of the lights by default: a standard deviation of 1.8 degrees."""
 
-_HEIGHT = 64  # of the map that is fitted
-_NORMALS = 16  # rows of the map of irradiance
+_LIGHTS_A_SUN = 3  # at least: the rest has its share
 _BLUR = 100.0  # a standard deviation of 5.7 degrees, two texels
 _PLACES = 400  # that a new light is tried at
 _SHARPNESSES = 7  # that it is tried with
 _STEPS = 5  # of refinement after each light
-_LAST_STEPS = 100
+_LAST_STEPS = 60
 _ENOUGH = 1e-6  # relative gain of a step below which there are no more
 _FLUX_WEIGHT = 1e3
 _TINY = 1e-300
 
 
 class Fit(NamedTuple):
-    """Lights for a map, and how far they are from it, averaged down to 64 x 128 texels.
-
-    error: RMS difference of radiance over the RMS of radiance, both weighted by solid angle. With
-        a sun it says how well the sun's disc is drawn, and nothing else.
-    tone_error: the same of log(1 + radiance / mean luminance), which sees the dome too.
-    irradiance_error: the same of the irradiance over all normals, unshadowed: what diffuse
-        surfaces see.
-    """
+    """Lights for a map, the suns last, and how far they are from it."""
 
     lights: Lights
-    error: float
-    tone_error: float
-    irradiance_error: float
+    errors: FitErrors
 
 
 class _Target(NamedTuple):
-    """What is fitted: directions (P, 3), blurred radiance (P, 3), weights (P,) of differences."""
+    """What is fitted: directions (P, 3), their solid angles (P,), blurred radiance (P, 3), weights
+    (P,) of differences."""
 
     ways: FloatArray
+    omega: FloatArray
     soft: FloatArray
     weights: FloatArray
 
@@ -106,72 +109,28 @@ def fit_lights(
             f"sharpness is {least_sharpness:g} to {most_sharpness:g}; expected a finite range "
             "above 0."
         )
-    map_ = downsampled(radiance, _HEIGHT)
-    level = float(_fluxes(map_).mean()) / (4.0 * math.pi)
-    map_ /= level
-    blur = 1.0 / (1.0 / _BLUR + 1.0 / most_sharpness)
-    target = _target(map_, blur)
-    # A light may become a point here. Kept from it, a sun that is one would be too wide, and
-    # lights around it would be bent to make up for that.
-    bounds = math.log(1.0 / (1.0 / least_sharpness + 1.0 / blur)), math.log(blur)
-    blobs = _placed(target, count, bounds, np.random.default_rng(seed), progress)
-    blobs = _refined(target, blobs, bounds, _LAST_STEPS)
-    variance = np.exp(-blobs.rates) - 1.0 / blur
-    sharpness = np.clip(1.0 / np.maximum(variance, _TINY), least_sharpness, most_sharpness)
-    lights = Lights(
-        blobs.axes, sharpness, _with_flux(target, blobs, integral(sharpness), _fluxes(map_))
-    )
-    fit = evaluate_fit(lights, map_)
+    suns, rest = split_suns(radiance, count // _LIGHTS_A_SUN)
+    map_ = downsampled(rest, HEIGHT)
+    level = float(fluxes(map_).mean()) / (4.0 * math.pi)
+    count -= len(suns.sharpness)
+    if level > 0:
+        blur = 1.0 / (1.0 / _BLUR + 1.0 / most_sharpness)
+        target = _target(map_ / level, blur)
+        # A light may become a point here. Kept from it, a lamp that is one would be too wide, and
+        # lights around it would be bent to make up for that.
+        bounds = math.log(1.0 / (1.0 / least_sharpness + 1.0 / blur)), math.log(blur)
+        blobs = _placed(target, count, bounds, np.random.default_rng(seed), progress)
+        blobs = _refined(target, blobs, bounds, _LAST_STEPS)
+        variance = np.exp(-blobs.rates) - 1.0 / blur
+        sharpness = np.clip(1.0 / np.maximum(variance, _TINY), least_sharpness, most_sharpness)
+        amplitudes = _with_flux(target, blobs, integral(sharpness), fluxes(map_) / level)
+        soft = Lights(blobs.axes, sharpness, amplitudes * level)
+        suns = Lights(*(np.concatenate(both) for both in zip(soft, suns, strict=True)))
     progress(1.0)
-    return fit._replace(lights=lights._replace(amplitudes=lights.amplitudes * level))
+    return Fit(suns, fit_errors(suns, radiance))
 
 
 # ---- the map ---------------------------------------------------------------------------------
-
-
-def downsampled(radiance: NDArray[np.floating], height: int) -> FloatArray:
-    """A map's means over the texels of a map of another height: (height, 2 height, 3) float64.
-
-    Means are over solid angle, so the flux stays. Raises ValueError for height < 1.
-    """
-    if height < 1:
-        raise ValueError(f"height is {height}; expected 1 or more.")
-    down = _overlaps(_falling(len(radiance)), _falling(height))
-    along = _overlaps(np.linspace(0, 1, 2 * len(radiance) + 1), np.linspace(0, 1, 2 * height + 1))
-    rows = np.tensordot(down, radiance.astype(np.float64), axes=1)
-    return np.einsum("ab,rbc->rac", along, rows, optimize=True)
-
-
-def _falling(height: int) -> FloatArray:
-    """Borders of the rows as shares of the sphere, from 0 at the zenith to 1."""
-    return np.sin(np.linspace(0.0, 0.5 * math.pi, height + 1)) ** 2
-
-
-def _overlaps(old: FloatArray, new: FloatArray) -> FloatArray:
-    """Shares (new, old) that old intervals have in new ones; of both the borders are given."""
-    ends = np.minimum(new[1:, None], old[1:])
-    shared = np.maximum(ends - np.maximum(new[:-1, None], old[:-1]), 0.0)
-    return shared / shared.sum(axis=1, keepdims=True)
-
-
-def _fluxes(map_: FloatArray) -> FloatArray:
-    """Integral (3,) over the sphere."""
-    return np.tensordot(solid_angles(len(map_)), map_.sum(axis=1), axes=1)
-
-
-def blurred(map_: FloatArray, sharpness: float) -> FloatArray:
-    """A map (H, 2 H, 3), each texel replaced by its surroundings' mean, weighted by an SG."""
-    height, width, _ = map_.shape
-    ways = texel_directions(height)
-    weights = solid_angles(height)[:, None]
-    spectrum = np.fft.rfft(map_, axis=1)
-    soft = np.empty(map_.shape)
-    # Turned about the axis the kernel is the same: columns are a circular convolution.
-    for row in range(height):
-        kernel = np.exp(sharpness * (ways @ ways[row, 0] - 1.0)) * weights
-        turned = np.fft.rfft(kernel / kernel.sum(), axis=1)
-        soft[row] = np.fft.irfft((turned[..., None] * spectrum).sum(axis=0), n=width, axis=0)
-    return np.maximum(soft, 0.0)  # the transform's rounding
 
 
 def _target(map_: FloatArray, blur: float) -> _Target:
@@ -180,7 +139,9 @@ def _target(map_: FloatArray, blur: float) -> _Target:
     omega = np.repeat(solid_angles(height), 2 * height)
     bright = luminance(soft)
     mean = float(omega @ bright) / (4.0 * math.pi)
-    return _Target(texel_directions(height).reshape(-1, 3), soft, np.sqrt(omega / (bright + mean)))
+    return _Target(
+        texel_directions(height).reshape(-1, 3), omega, soft, np.sqrt(omega / (bright + mean))
+    )
 
 
 # ---- placing ---------------------------------------------------------------------------------
@@ -248,11 +209,12 @@ def _with_flux(
     """Amplitudes (N, 3) of the lights before the blur, which have these integrals."""
     # A blurred light has the flux of the light.
     shares = integrals / integral(np.exp(blobs.rates))
-    values = _values(target.ways, blobs.axes, blobs.rates) * shares * target.weights[:, None]
+    behind = occluded_cosines(target.ways) * target.omega
+    values = behind @ _values(target.ways, blobs.axes, blobs.rates) * shares
     heavy = _FLUX_WEIGHT * np.linalg.norm(values) / np.linalg.norm(integrals)
     amplitudes = _nonnegative(
         np.concatenate([values, heavy * integrals[None]]),
-        np.concatenate([_weighted(target), heavy * fluxes[None]]),
+        np.concatenate([behind @ target.soft, heavy * fluxes[None]]),
     )
     return amplitudes * (fluxes / np.maximum(integrals @ amplitudes, _TINY))
 
@@ -348,35 +310,3 @@ def _normal_equations(
         matrix[np.ix_(mine, mine)] += factors[:, None] * products * factors
         slope[mine] += factors * onto[:, channel]
     return matrix, slope
-
-
-# ---- how good it is --------------------------------------------------------------------------
-
-
-def evaluate_fit(lights: Lights, radiance: NDArray[np.floating]) -> Fit:
-    """The errors of lights against a map (H, 2 H, 3), averaged down to 64 rows."""
-    map_ = downsampled(radiance, _HEIGHT)
-    height = len(map_)
-    ways, true = texel_directions(height).reshape(-1, 3), map_.reshape(-1, 3)
-    omega = np.repeat(solid_angles(height), 2 * height)
-    found = evaluate(lights, ways)
-    mean = float(omega @ luminance(true)) / (4.0 * math.pi)
-    normals = texel_directions(_NORMALS).reshape(-1, 3)
-    falling = np.maximum(normals @ ways.T, 0.0) * omega
-    return Fit(
-        lights,
-        _relative(found, true, omega),
-        _relative(np.log1p(found / mean), np.log1p(true / mean), omega),
-        _relative(falling @ found, falling @ true, np.repeat(solid_angles(_NORMALS), 2 * _NORMALS)),
-    )
-
-
-def flux_error(lights: Lights, radiance: NDArray[np.floating]) -> float:
-    """Largest relative error, over the channels, of the integral of the lights' radiance."""
-    wanted = _fluxes(radiance.astype(np.float64))
-    found = integral(lights.sharpness) @ lights.amplitudes
-    return float((np.abs(found - wanted) / np.maximum(wanted, _TINY)).max())
-
-
-def _relative(found: FloatArray, true: FloatArray, omega: FloatArray) -> float:
-    return math.sqrt(float((omega @ (found - true) ** 2).sum() / (omega @ true**2).sum()))

@@ -98,6 +98,24 @@ def shaded(lobes: Lobes, distances: NDArray[np.floating], table: VisibleTable) -
     return np.einsum("pl,plc->pc", visible, lobes.weights)
 
 
+def matt_axes(normals: FloatArray, lights: Lights, cosine: CosineLobes) -> FloatArray:
+    """Axes (P, N, 3) of the matt lobes at normals (P, 3)."""
+    return _matt(normals, np.ones((len(normals), 3)), lights, cosine)[0]
+
+
+def matt_light(
+    normals: FloatArray,
+    distances: NDArray[np.floating],
+    lights: Lights,
+    cosine: CosineLobes,
+    table: VisibleTable,
+) -> FloatArray:
+    """Radiance (P, 3) float64 of matt surfaces of albedo 1 with normals (P, 3), where d along the
+    axes of their matt lobes is ``distances`` (P, N). ``cosine`` is of the lights' sharpness."""
+    found = Lobes(*_matt(normals, np.ones((len(normals), 3)), lights, cosine))
+    return shaded(found, distances, table)
+
+
 def _matt(
     normals: FloatArray, albedo: FloatArray, lights: Lights, fitted: CosineLobes
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

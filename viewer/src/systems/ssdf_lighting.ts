@@ -11,7 +11,8 @@ import { ask } from "./ssdf_lighting/ask";
 import { TurnedEnvironment } from "./ssdf_lighting/turned_environment";
 import { clusterSurface } from "./ssdf_lighting/clusters";
 import type { DistanceTables } from "./ssdf_lighting/distance_tables";
-import { EdgePass } from "./ssdf_lighting/edge_pass";
+import { EdgePass, type LightUniforms } from "./ssdf_lighting/edge_pass";
+import { bounced, mattLight, readBounce, showBounced, type BounceFactors } from "./ssdf_lighting/interreflection";
 import { lightParts, litParts, readMaterials, type Materials } from "./ssdf_lighting/lit_parts";
 import { COLUMNS, FINE, type MattTables } from "./ssdf_lighting/lobe_tables";
 import { readProbe } from "./ssdf_lighting/probe_files";
@@ -23,6 +24,7 @@ interface LitState {
   /** Degrees, counter-clockwise from above. */
   turn: number;
   shadows: boolean;
+  reflected: boolean;
   clusters: boolean;
   behind: boolean;
   /** Stops. */
@@ -49,6 +51,7 @@ interface Loaded {
   distances: Promise<DistanceTables>;
   triangleCluster: ArrayLike<number>;
   probe: Probe;
+  bounce: BounceFactors;
 }
 
 const viewer: SystemViewer = {
@@ -56,13 +59,14 @@ const viewer: SystemViewer = {
   async make(pkg, context) {
     const distances = readDistances(pkg);
     distances.catch(() => {}); // told by `update`
-    const [mesh, materials, probe, triangleCluster] = await Promise.all([
+    const [mesh, materials, probe, triangleCluster, bounce] = await Promise.all([
       pkg.mesh("mesh"),
       readMaterials(pkg),
       readOwnProbe(pkg),
       pkg.array("triangle_cluster"),
+      readBounce(pkg),
     ]);
-    return new LitView(pkg, context, { mesh, materials, distances, triangleCluster, probe });
+    return new LitView(pkg, context, { mesh, materials, distances, triangleCluster, probe, bounce });
   },
 };
 export default viewer;
@@ -97,7 +101,7 @@ class LitView implements LiveView {
   readonly navigation = "orbit";
   readonly bounds: Bounds = { centre: [0, 0, 0], radius: 1 };
   readonly home?: Camera;
-  private readonly settings: LitState = { turn: 0, shadows: true, clusters: false, behind: false, exposure: 0 };
+  private readonly settings: LitState = { turn: 0, shadows: true, reflected: true, clusters: false, behind: false, exposure: 0 };
   private readonly scene = new THREE.Scene();
   private readonly parts: Surface[];
   private readonly backdrop = new TurnedEnvironment();
@@ -105,6 +109,8 @@ class LitView implements LiveView {
   private readonly exposure: number;
   private readonly background: Vector;
   private readonly count: number;
+  private readonly vertexOfRow: Int32Array;
+  private shownBounce = "";
   private clusterScene: THREE.Scene | undefined;
   private readonly whole: Promise<void>;
   private ended = false;
@@ -130,6 +136,8 @@ class LitView implements LiveView {
     const shared = { lightCount: this.count, edges: this.edges.texture, edgeRows: this.edges.rows };
     this.parts = litParts(mesh, materials, shared);
     this.scene.add(...this.parts, this.backdrop);
+    this.vertexOfRow = new Int32Array(loaded.bounce.codes.length / loaded.bounce.steps.length);
+    SOURCE.values.forEach((row, vertex) => (this.vertexOfRow[row] = vertex));
     this.show(loaded.probe);
     this.whole = loaded.distances.then((tables) => {
       this.distanceBytes = 2 * tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
@@ -150,6 +158,7 @@ class LitView implements LiveView {
       { kind: "slider", name: "turn", label: "Turn of the light", min: 0, max: 360, step: 1, units: "°" },
       { kind: "slider", name: "exposure", label: "Exposure", min: -3, max: 3, step: 0.1, units: "stops" },
       { kind: "toggle", name: "shadows", label: "Shadows" },
+      { kind: "toggle", name: "reflected", label: "Light between surfaces" },
       { kind: "toggle", name: "behind", label: "Environment behind" },
       { kind: "toggle", name: "clusters", label: "Clusters" },
       {
@@ -191,10 +200,31 @@ class LitView implements LiveView {
     const eye = eyeOf(camera);
     this.edges.draw(renderer, eye, lights, this.mattAxes, this.settings.shadows);
     lightParts(this.parts, eye, lights, this.matt);
+    this.reflect(renderer, lights);
     this.backdrop.visible = this.settings.behind;
     this.backdrop.set(turn, exposure);
     const plain = this.background.map((value) => value * exposure) as Vector;
     drawScene(renderer, this.scene, camera, size, this.bounds, plain);
+  }
+
+  /** Lets surfaces light each other, where that has changed since the last frame. */
+  private reflect(renderer: THREE.WebGLRenderer, lights: LightUniforms): void {
+    const { mesh, bounce } = this.loaded;
+    const { reflected, shadows } = this.settings;
+    const known = `${reflected} ${shadows && this.distanceBytes} ${lights.lights.join()} ${lights.amplitudes.join()}`;
+    if (known === this.shownBounce) return;
+    this.shownBounce = known;
+    const direct = new Float64Array(3 * bounce.samples.length);
+    if (reflected) {
+      const distance = this.edges.mattDistances(renderer);
+      const matt = { ...lights, radiance: this.probe.tables.radiance };
+      bounce.samples.forEach((row, k) => {
+        const vertex = this.vertexOfRow[row];
+        const normal = mesh.normals!.subarray(3 * vertex, 3 * vertex + 3);
+        direct.set(mattLight(normal, matt, (light) => distance(vertex, light)), 3 * k);
+      });
+    }
+    showBounced(this.parts, mesh.attributes.SOURCE.values, bounced(bounce, direct));
   }
 
   figures(): Record<string, number | string> {
@@ -225,7 +255,8 @@ class LitView implements LiveView {
     const scale = brightness(own) / brightness(environment);
     if (!Number.isFinite(scale)) throw new Error(`${file.name}: radiance is 0 everywhere; expected some light.`);
     environment.data.forEach((value, k, data) => (data[k] = value * scale));
-    const fit = await ask({ kind: "fit", environment, count: this.count });
+    const whole = { height: given.height, data: given.data.map((value) => value * scale) };
+    const fit = await ask({ kind: "fit", environment: whole, count: this.count });
     const sharpness = Float32Array.from(fit.lights.sharpness);
     this.show({
       name: file.name,

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from pipelines.drawing.stage import Camera
 from pipelines.geometry.meshes import Mesh
 from pipelines.geometry.shapes import square
+from pipelines.light.built_in_environments import lamps
+from pipelines.light.environment_maps import solid_angles, texel_directions
+from pipelines.ssdf_lighting.drawing.light_sources import GaussianSource, ProbeSource
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
 from pipelines.ssdf_lighting.light.microfacets import gloss
 from pipelines.ssdf_lighting.light.shading import Materials
@@ -40,7 +43,9 @@ def plane(
     materials: Materials, lights: Lights, camera: Camera, *, count: int = 30, samples: int = 64
 ) -> Traced:
     """``count`` x ``count`` pixels of a plane, all alike."""
-    return ray_traced(lit(FLOOR, materials), lights, camera, (count, count), samples, seed=1)
+    return ray_traced(
+        lit(FLOOR, materials), GaussianSource(lights), camera, (count, count), samples, seed=1
+    )
 
 
 def hemisphere(count: int = 500) -> tuple[Array, Array]:
@@ -111,7 +116,7 @@ def test_shadow_of_a_square_in_even_light() -> None:
     camera = Camera((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), height=1e-4)
     normals = np.concatenate([FLOOR.normals, -roof.normals])
     mesh = LitMesh(vertices, triangles, normals, np.zeros(len(vertices), int), WHITE)
-    traced = ray_traced(mesh, even, camera, (16, 16), 256, seed=3)
+    traced = ray_traced(mesh, GaussianSource(even), camera, (16, 16), 256, seed=3)
     check_mean(traced, np.full(3, 1 - hidden))
 
 
@@ -119,8 +124,29 @@ def test_light_from_below_the_triangle_does_not_arrive() -> None:
     """Normals that lean over towards a light below the horizon."""
     normals = np.tile([0.8, 0.0, 0.6], (len(FLOOR.vertices), 1))
     below = Lights(np.array([[0.9797959, 0.0, -0.2]]), np.array([1000.0]), np.ones((1, 3)))
-    traced = ray_traced(lit(FLOOR, WHITE)._replace(normals=normals), below, DOWN, (4, 4), 64)
+    traced = ray_traced(
+        lit(FLOOR, WHITE)._replace(normals=normals), GaussianSource(below), DOWN, (4, 4), 64
+    )
     assert traced.radiance[..., :3].max() < 1e-6
+
+
+def test_a_plane_under_a_map_of_radiance() -> None:
+    """The probe itself: a matt and a glossy plane by quadrature over the map's texels."""
+    height = 64
+    radiance = lamps(height)
+    ways = texel_directions(height).reshape(-1, 3)
+    weights = np.repeat(solid_angles(height), 2 * height) * (ways[:, 2] > 0)
+    materials = Materials(np.array([[0.7, 0.4, 0.2]]), np.array([0.05]), np.array([0.4]))
+    theta = np.radians(40)
+    view = np.array([np.sin(theta), 0.0, np.cos(theta)])
+    half = ways + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    shine = gloss(ways[:, 2], view[2], half[:, 2], half @ view, 0.05, 0.4)[:, None]
+    reflected = shine + materials.albedo / np.pi * ways[:, 2:]
+    expected = (weights[:, None] * reflected * radiance.reshape(-1, 3)).sum(axis=0)
+    source = ProbeSource(radiance)
+    traced = ray_traced(lit(FLOOR, materials), source, leaning(40), (30, 30), 64, seed=2)
+    check_mean(traced, expected)
 
 
 def test_a_picture_is_repeatable_and_knows_its_borders() -> None:

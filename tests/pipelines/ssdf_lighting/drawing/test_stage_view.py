@@ -107,6 +107,20 @@ def test_nothing_of_an_earlier_frame_stays(scene: Scene) -> None:
             check_equal(drawn, numpy_picture(scene, look, camera))
 
 
+def test_reflected_light_is_added(scene: Scene) -> None:
+    look = lights(5)
+    mesh = LitMesh(*scene, MATERIALS)
+    reflected = 0.3 + 0.2 * np.sin(3 * scene.vertices)
+    actor = LitActor(mesh, look)
+    actor.show_bounced(reflected)
+    drawn = draw_lit(SIZE, actor, NEAR, look, distances(scene))
+    expected = render_numpy(mesh, distances(scene), look, NEAR, SIZE, reflected)
+    check_equal(drawn, expected)
+    assert np.abs(expected - numpy_picture(scene, look, NEAR)).max() > 0.1
+    with pytest.raises(ValueError, match="bounced light: found shape"):
+        actor.show_bounced(reflected[1:])
+
+
 def test_hidden_sky_is_seen(scene: Scene) -> None:
     """The picture depends on each distance: half of them off, and it is another one."""
     look, at = lights(5), distances(scene)

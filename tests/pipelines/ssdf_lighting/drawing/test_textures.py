@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import orbit
 from pipelines.geometry import shapes
+from pipelines.ssdf_lighting.drawing.light_sources import GaussianSource
 from pipelines.ssdf_lighting.drawing.ray_tracing import ray_traced
 from pipelines.ssdf_lighting.drawing.stage_view import LitActor, draw_lit
 from pipelines.ssdf_lighting.figures import colour_error, psnr, reflectance
@@ -64,20 +65,23 @@ def square(made: TexturedMaterial, times: float = 1.0, shift: float = 0.0) -> Sc
     return make_scene(flat.vertices, flat.triangles, part, materials, textures)
 
 
-def drawn(scene: Scene) -> NDArray[np.float32]:
-    """Nothing hides light but the surface itself."""
+def drawn(scene: Scene, reflected: float = 0.0) -> NDArray[np.float32]:
+    """Nothing hides light but the surface itself; with light from other surfaces."""
     mesh = split_by_part(scene).mesh
+    actor = LitActor(mesh, LIGHTS)
+    places = mesh.vertices @ np.array([[1.0, 0.5, 0.2], [0.3, 1.0, 0.1], [0.0, 0.0, 0.0]])
+    actor.show_bounced(reflected * (1.0 + places))
 
     def horizon(axes: NDArray[np.float32]) -> NDArray[np.float64]:
         height = np.einsum("vlc,vc->vl", axes, mesh.normals)
         return np.arcsin(np.clip(height, -1.0, 1.0))
 
-    return draw_lit(SIZE, LitActor(mesh, LIGHTS), CAMERA, LIGHTS, horizon)
+    return draw_lit(SIZE, actor, CAMERA, LIGHTS, horizon)
 
 
 def traced(scene: Scene, samples: int = 64) -> NDArray[np.float64]:
     mesh = split_by_part(scene).mesh
-    return ray_traced(mesh, LIGHTS, CAMERA, SIZE, samples, jittered=False).radiance
+    return ray_traced(mesh, GaussianSource(LIGHTS), CAMERA, SIZE, samples, jittered=False).radiance
 
 
 def pictures(scene: Scene) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.bool_]]:
@@ -98,9 +102,10 @@ def test_textures_of_one_colour_draw_as_the_material_itself() -> None:
         textures=None,
         materials=Materials(linear[None], np.array([0.04]), np.array([(153 / 255) ** 2])),
     )
-    found, expected = drawn(textured), drawn(plain)
-    shown = expected[..., 3] > 0.5
-    np.testing.assert_allclose(found[shown], expected[shown], rtol=0.02, atol=2e-3)
+    for reflected in (0.0, 0.4):
+        found, expected = drawn(textured, reflected), drawn(plain, reflected)
+        shown = expected[..., 3] > 0.5
+        np.testing.assert_allclose(found[shown], expected[shown], rtol=0.02, atol=2e-3)
 
 
 @pytest.mark.parametrize(

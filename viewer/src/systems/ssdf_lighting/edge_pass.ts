@@ -142,6 +142,19 @@ export class EdgePass {
     this.drawn = ofGloss;
   }
 
+  /** d (light) at a vertex's matt lobes, of what was drawn last: read back from the card. */
+  mattDistances(renderer: THREE.WebGLRenderer): (vertex: number, light: number) => number {
+    const rows = this.groups * this.rows;
+    const isFloat = this.target.texture.type === THREE.FloatType;
+    const values = isFloat ? new Float32Array(4 * COLUMNS * rows) : new Uint16Array(4 * COLUMNS * rows);
+    renderer.readRenderTargetPixels(this.target, 0, 0, COLUMNS, rows, values);
+    return (vertex, light) => {
+      const row = (light >> 2) * this.rows + Math.floor(vertex / COLUMNS);
+      const value = values[4 * (row * COLUMNS + (vertex % COLUMNS)) + (light & 3)];
+      return isFloat ? value : THREE.DataUtils.fromHalfFloat(value);
+    };
+  }
+
   /** Frees what it holds on the graphics card. */
   dispose(): void {
     this.target.dispose();

@@ -1,11 +1,13 @@
 /**
  * Spherical Gaussians fitted to an environment, after `light/environment_fit.py`: lights are placed
  * one by one where they help most and refined together by Levenberg and Marquardt's method; at last
- * their amplitudes follow from nonnegative least squares with the flux given. Here lights are placed
+ * their amplitudes follow from nonnegative least squares of the irradiance behind random occluders,
+ * with the flux given. Suns are taken out of the map before (`suns.ts`). Here lights are placed
  * on a map of half the height, and the last refinement takes fewer steps.
  */
 
 import { Matrix, nonnegative, solved } from "./least_squares";
+import { splitSuns, type Sun } from "./suns";
 import { Sphere, blurred, downsampled, type Environment } from "./sphere_map";
 
 /** An environment as a sum of N Gaussians. */
@@ -34,6 +36,10 @@ const STEPS = 5;
 const LAST_STEPS = 30;
 const ENOUGH = 1e-6;
 const FLUX_WEIGHT = 1e3;
+const LIGHTS_A_SUN = 3;
+const OCCLUDERS = 384;
+const SOFT = 0.05; // radians
+const SHARPEST = 600; // that texels of the map can show
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 
 /** Blurred lights: axes (N, 3), log of the sharpness (N), square roots of amplitudes (N, 3). */
@@ -51,8 +57,9 @@ interface Target {
 }
 
 /** Fits `count` lights whose λ lies between the bounds; their flux is the map's. */
-export function fitLights(given: Environment, count: number, least = 3, most = 300): Fit {
-  const map = downsampled(given, HEIGHT);
+export function fitLights(given: Environment, count: number, least = 3, most = 1000): Fit {
+  const { suns, rest } = splitSuns(given, Math.floor(count / LIGHTS_A_SUN));
+  const map = downsampled({ height: given.height, data: rest }, HEIGHT);
   const sphere = new Sphere(HEIGHT);
   const fluxes = sphere.flux(map.data);
   const level = (fluxes[0] + fluxes[1] + fluxes[2]) / 3 / (4 * Math.PI) || 1;
@@ -63,7 +70,7 @@ export function fitLights(given: Environment, count: number, least = 3, most = 3
   const small = new Sphere(PLACING);
   const coarse = targetOf(small, downsampled({ height: HEIGHT, data: soft }, PLACING).data);
   const bounds: [number, number] = [Math.log(1 / (1 / least + 1 / blur)), Math.log(blur)];
-  let blobs = placed(coarse, count, bounds);
+  let blobs = placed(coarse, count - suns.length, bounds);
   blobs = refined(target, blobs, bounds, LAST_STEPS);
   const sharpness = Float64Array.from(blobs.rates, (rate) => {
     const variance = Math.exp(-rate) - 1 / blur;
@@ -72,8 +79,41 @@ export function fitLights(given: Environment, count: number, least = 3, most = 3
   const unit = fluxes.map((flux) => flux / level);
   const amplitudes = withFlux(target, blobs, sharpness, unit);
   const axes = Float64Array.from(blobs.axes.flat());
-  const irradianceError = errorOfIrradiance({ axes, sharpness, amplitudes }, values, sphere);
-  return { lights: { axes, sharpness, amplitudes: amplitudes.map((value) => value * level) }, irradianceError };
+  const wider = { axes, sharpness, amplitudes: amplitudes.map((value) => value * level) };
+  const irradianceError = errorOfIrradiance(wider, map.data, suns, sphere);
+  return { lights: withSuns(wider, suns), irradianceError };
+}
+
+function withSuns({ axes, sharpness, amplitudes }: Lights, suns: Sun[]): Lights {
+  return {
+    axes: Float64Array.from([...axes, ...suns.flatMap(({ axis }) => axis)]),
+    sharpness: Float64Array.from([...sharpness, ...suns.map((sun) => sun.sharpness)]),
+    amplitudes: Float64Array.from([...amplitudes, ...suns.flatMap(({ amplitude }) => amplitude)]),
+  };
+}
+
+/** Surfaces, each behind a soft edge: what they see (P) of light from everywhere, times omega. */
+function occluders({ count, ways, omega }: Sphere): Float32Array[] {
+  let state = 1;
+  const random = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+  const somewhere = () => {
+    const z = 2 * random() - 1;
+    const azimuth = 2 * Math.PI * random();
+    const radius = Math.sqrt(1 - z * z);
+    return [radius * Math.cos(azimuth), radius * Math.sin(azimuth), z];
+  };
+  return Array.from({ length: OCCLUDERS }, () => {
+    const [normal, edge] = [somewhere(), somewhere()];
+    const seen = new Float32Array(count);
+    for (let p = 0; p < count; p++) {
+      const [x, y, z] = [ways[3 * p], ways[3 * p + 1], ways[3 * p + 2]];
+      const cosine = normal[0] * x + normal[1] * y + normal[2] * z;
+      if (cosine <= 0) continue;
+      const step = 0.5 + 0.5 * Math.tanh((edge[0] * x + edge[1] * y + edge[2] * z) / SOFT);
+      seen[p] = cosine * step * omega[p];
+    }
+    return seen;
+  });
 }
 
 /** Radiance (3) of lights in a direction. */
@@ -178,12 +218,17 @@ function fittedAmplitudes({ soft, weights }: Target, functions: Float64Array[]):
 }
 
 /** Amplitudes (N, 3) of the lights before the blur, flux and all. */
-function withFlux({ soft, weights, sphere }: Target, blobs: Blobs, sharpness: Float64Array, fluxes: number[]): Float64Array {
+function withFlux({ soft, sphere }: Target, blobs: Blobs, sharpness: Float64Array, fluxes: number[]): Float64Array {
   const integrals = Array.from(sharpness, integral);
+  const behind = occluders(sphere);
   const own = blobs.axes.map((axis, light) => {
     const share = integrals[light] / integral(Math.exp(blobs.rates[light]));
-    return valuesOf(sphere, axis, blobs.rates[light]).map((value, p) => value * share * weights[p]);
+    const values = valuesOf(sphere, axis, blobs.rates[light]);
+    return Float64Array.from(behind, (seen) => share * seen.reduce((sum, part, p) => sum + part * values[p], 0));
   });
+  const seenOfMap = behind.map((seen) =>
+    [0, 1, 2].map((channel) => seen.reduce((sum, part, p) => sum + part * soft[3 * p + channel], 0)),
+  );
   const norm = (rows: ArrayLike<number>[]) =>
     Math.sqrt(rows.reduce((sum, row) => sum + Array.from(row).reduce((part, value) => part + value * value, 0), 0));
   const heavy = (FLUX_WEIGHT * norm(own)) / norm([integrals]);
@@ -196,7 +241,7 @@ function withFlux({ soft, weights, sphere }: Target, blobs: Blobs, sharpness: Fl
   for (let channel = 0; channel < 3; channel++) {
     const wanted = own.map(
       (values, light) =>
-        values.reduce((sum, value, p) => sum + value * weights[p] * soft[3 * p + channel], 0) +
+        values.reduce((sum, value, k) => sum + value * seenOfMap[k][channel], 0) +
         heavy * heavy * integrals[light] * fluxes[channel],
     );
     const amplitudes = nonnegative(gram, wanted);
@@ -326,8 +371,21 @@ function correlatedExactly(own: Float64Array, rest: Float64Array): number[] {
 }
 
 /** Relative RMS error of irradiance over 512 normals. */
-function errorOfIrradiance(lights: Lights, values: Float64Array, sphere: Sphere): number {
+function errorOfIrradiance(soft: Lights, map: ArrayLike<number>, suns: Sun[], sphere: Sphere): number {
   const normals = new Sphere(16);
+  // Suns are exact; as wide as texels, they are part of both.
+  const wide = suns.map((sun) => {
+    const sharpness = Math.min(sun.sharpness, SHARPEST);
+    const kept = integral(sun.sharpness) / integral(sharpness);
+    return { ...sun, sharpness, amplitude: sun.amplitude.map((value) => value * kept) };
+  });
+  const lights = withSuns(soft, wide);
+  const none = { axes: new Float64Array(), sharpness: new Float64Array(), amplitudes: new Float64Array() };
+  const values = Float64Array.from(map);
+  for (let p = 0; p < sphere.count; p++) {
+    const ofSuns = radianceOf(withSuns(none, wide), sphere.ways.subarray(3 * p, 3 * p + 3));
+    ofSuns.forEach((value, channel) => (values[3 * p + channel] += value));
+  }
   const again = Float64Array.from({ length: 3 * sphere.count });
   for (let p = 0; p < sphere.count; p++) again.set(radianceOf(lights, sphere.ways.subarray(3 * p, 3 * p + 3)), 3 * p);
   let [off, whole] = [0, 0];

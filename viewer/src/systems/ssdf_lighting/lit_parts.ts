@@ -143,6 +143,7 @@ function part(
     triangles: Uint32Array.from(corners),
     attributes: {
       shading: { values: gathered(own, mesh.normals!, 3), width: 3 },
+      bounced: { values: new Float32Array(3 * own.length), width: 3 },
       number: { values: Float32Array.from(own), width: 1 },
       ...(finish.isVaried
         ? { paint: { values: gathered(own, PAINT.values, 3), width: 3 }, mappings: { values: mappings, width: 4 } }

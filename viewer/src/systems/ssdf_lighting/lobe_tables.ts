@@ -99,7 +99,7 @@ function sharpnessOfResultant(length: number): number {
 }
 
 /** The visible share of a Gaussian, as `visibleShare` of `sg_visibility.glsl`. */
-function edgeShare(distance: number, sharpness: number): number {
+export function edgeShare(distance: number, sharpness: number): number {
   const size = Math.abs(distance);
   const away = Math.min(size, Math.PI / 2);
   const sine = away * ((0.0076143 * away * away - 0.166051) * away * away + 1);
