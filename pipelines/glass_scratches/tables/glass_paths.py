@@ -30,7 +30,7 @@ _KEPT, _LOST = -1, -2
 
 class GlassPaths(NamedTuple):
     """``leaving`` (2 M in, places, 2 M out) int64: paths by where they cross the opening and the
-    bin that they leave into; ``kept`` (2 M in,): that walls kept; ``rays`` a bin."""
+    bin that they leave into; ``kept`` (2 M in, places): that walls kept; ``rays`` a bin."""
 
     leaving: NDArray[np.int64]
     kept: NDArray[np.int64]
@@ -64,7 +64,9 @@ def shoot_glass_paths(
     every = np.arange(2 * bins) if incidence is None else incidence
     chosen = every if lean < 1.0 else every[every >= bins]
     paths = GlassPaths(
-        np.zeros((2 * bins, PLACES, 2 * bins), np.int64), np.zeros(2 * bins, np.int64), rays
+        np.zeros((2 * bins, PLACES, 2 * bins), np.int64),
+        np.zeros((2 * bins, PLACES), np.int64),
+        rays,
     )
     optics = _Optics(
         np.sqrt(max(1.0 - lean * lean, 0.0)),
@@ -136,10 +138,11 @@ def _shoot_from(walls, optics, sines, bin_in, seed, paths):  # type: ignore[no-u
         else:
             at = _At(groove, -1, False, place, 0.0, -sine, -cosine)
         state, out = _follow(walls, optics, at, state, bins)
+        part = min(int(place * places), places - 1)
         if out >= 0:
-            leaving[min(int(place * places), places - 1), out] += 1
+            leaving[part, out] += 1
         elif out == _KEPT:
-            paths.kept[bin_in] += 1
+            paths.kept[bin_in, part] += 1
 
 
 @njit(cache=True, nogil=True)

@@ -120,16 +120,20 @@ def table_of_glass_paths(
     The error is that of independent paths in both directions; stratified ones have less.
     """
     weights = side_weights(paths.leaving.shape[-1] // 2, ratio)
-    shot = paths.leaving.sum(axis=(1, 2)) + paths.kept > 0
+    left = paths.leaving.sum(axis=2)
+    from_places = (left + paths.kept).T  # (places, in)
+    shot = from_places.sum(axis=0) > 0
     mean = paths.leaving.sum(axis=1) / paths.rays
     error2 = mean * (1.0 - mean) / paths.rays
     counted = (mean / weights).T  # (out, in)
     variance = (error2 / weights**2).T
-    kept = paths.kept / paths.rays
+    kept = paths.kept.sum(axis=1) / paths.rays
     rho = np.where(np.outer(shot, shot), (counted + counted.T) / 2, 0.0)
     rho = _closed(rho, weights, np.where(shot, 1.0 - kept, 0.0))
-    across = paths.leaving.transpose(1, 0, 2) * (PLACES / paths.rays) / weights
-    return rho, np.sqrt(variance + variance.T) / 2, kept, _with_mean(across, rho, weights)
+    with np.errstate(invalid="ignore"):
+        across = paths.leaving.transpose(1, 0, 2) / from_places[..., None] / weights
+    across = _with_mean(np.nan_to_num(across), rho, weights)
+    return rho, np.sqrt(variance + variance.T) / 2, kept, across
 
 
 def _closed(

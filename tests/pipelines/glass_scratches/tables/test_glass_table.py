@@ -1,4 +1,4 @@
-"""Walls of glass against closed forms of planes and prisms, paths against the solved table, laws."""
+"""Walls of glass: closed forms of planes and prisms, paths against the solved table, laws."""
 
 from __future__ import annotations
 
@@ -58,24 +58,21 @@ def beams(profile: Floats, lean: float, rays: int = 20_000, **given: float) -> F
 def test_a_plane_reflects_and_bends_as_fresnel_and_snell_have_it(lean: float) -> None:
     """In space: the cosine to the normal is cos theta cos phi, whatever goes along the scratch."""
     found = beams(SHALLOW, lean)
-    phi = bin_centres(BINS)
+    phi, edges = bin_centres(BINS), np.sin(bin_edges(BINS))
+    share = (np.arange(2000)[:, None] + 0.5) / 2000
+    cosines = np.sqrt(1 - (edges[:-1] + share * np.diff(edges)) ** 2)  # of a bin's beam
     outer = np.sqrt(1 - lean**2)
     reflected = found[:BINS, :BINS].sum(axis=1)
-    middle = slice(2, -2)  # at the horizon F changes inside a bin
-    np.testing.assert_allclose(
-        reflected[middle], fresnel(outer * np.cos(phi), 1 / INDEX)[middle], atol=0.01
-    )
+    expected = fresnel(outer * cosines, 1 / INDEX).mean(axis=0)
+    np.testing.assert_allclose(reflected, expected, atol=0.01)
     for number in range(4, BINS - 4):
         assert np.argmax(found[number, :BINS]) == BINS - 1 - number
         bent = np.arcsin(-outer * np.sin(phi[number]) / np.sqrt(INDEX**2 - lean**2))
         went = np.argmax(found[number, BINS:])
         assert abs(bin_centres(BINS)[went] - bent) < np.pi / BINS
     inner = np.sqrt(INDEX**2 - lean**2) / INDEX
-    np.testing.assert_allclose(
-        found[BINS:, BINS:].sum(axis=1)[middle],
-        fresnel(inner * np.cos(phi), INDEX)[middle],
-        atol=0.06,  # near the critical angle it changes inside a bin
-    )
+    expected = fresnel(inner * cosines, INDEX).mean(axis=0)
+    np.testing.assert_allclose(found[BINS:, BINS:].sum(axis=1), expected, atol=0.01)
 
 
 def test_from_a_lean_of_one_on_all_is_reflected_inside() -> None:
@@ -86,11 +83,13 @@ def test_from_a_lean_of_one_on_all_is_reflected_inside() -> None:
 
 
 def test_right_angles_send_light_back_inside() -> None:
-    """Straight up it meets a wall at 45 degrees, over the critical angle of 41.8, then the other."""
-    prism = np.array([(-5.0, 0.0), (0.0, -5.0), (5.0, 0.0)])
-    found = beams(prism, 0.0)
-    for number in (BINS // 2 - 1, BINS // 2):
-        assert found[BINS + number, BINS + number] > 0.999
+    """Straight up it meets a wall at 45 degrees, over the critical angle of 41.8, then another."""
+    prism = groove_walls(np.array([(-5.0, 0.0), (0.0, -5.0), (5.0, 0.0)]))
+    middle = np.array([64 + 31, 64 + 32])  # up to 2.8 degrees off
+    paths = shoot_glass_paths(prism, 0.0, bins=64, index=INDEX, rays=2000, incidence=middle)
+    for number in middle:
+        # But for a few that pass below the other.
+        assert paths.leaving[number, :, number].sum() > 0.95 * 2000
 
 
 def test_glass_of_the_index_of_air_is_not_there() -> None:
@@ -138,7 +137,7 @@ def test_a_table_of_radiance_itself_is_not_symmetric() -> None:
     weights = side_weights(16, 1.0)
     parts = made.rho[0] * lean_weights(16, made.leans, INDEX, keeps=False)[0]
     radiance = parts / weights
-    assert np.abs(radiance - radiance.T).max() / radiance.max() > 0.3
+    assert np.abs(radiance - radiance.T).max() / radiance.max() > 0.2
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])
@@ -159,7 +158,7 @@ def test_counts_are_reciprocal_as_far_as_noise_goes(slope: float, lean: float) -
     assert 0.3 < np.sqrt(np.mean(z**2)) < 1.1
     wrong = part * np.tile(etendue[:BINS], 2)[:, None]
     z = (wrong - wrong.T)[often] / np.sqrt(variance + variance.T)[often]
-    assert np.sqrt(np.mean(z**2)) > 5
+    assert np.sqrt(np.mean(z**2)) > 3
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -203,7 +202,7 @@ def test_ground_walls_stay_within_their_groove_and_scatter_more() -> None:
     walls = groove_walls(built_in_profile("trapezoid", 10.0, 4.0), 0.3, seed=1)
     points = groove_points(walls)
     assert len(points) == 32
-    assert points[..., 1].max() <= 0.0
+    assert points[..., 1].max() < 1e-12
     np.testing.assert_allclose(points[:, -1], [[1.0, 0.0]] * 32, atol=1e-12)
     slopes = np.arctan2(walls.along_y, walls.along_x)
     assert slopes.std(axis=0).mean() > 0.15
