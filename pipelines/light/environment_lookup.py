@@ -40,6 +40,32 @@ def radiance_from_direction(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def smooth_radiance_from_direction(
+    radiance: Radiance, x: float, y: float, z: float
+) -> tuple[float, float, float]:
+    """Radiance from a direction, linear between the middles of texels, as a picture of the map is
+    looked at: over the azimuth's border the map goes on, at the poles it ends.
+
+    Not what samples of the map see (`environment_sampling`), for which texels are even.
+    """
+    height, width, _ = radiance.shape
+    down = math.atan2(math.sqrt(x * x + y * y), z) * (height / math.pi) - 0.5
+    along = (0.5 - math.atan2(y, x) / (2.0 * math.pi)) * width - 0.5
+    down = min(max(down, 0.0), height - 1.0)
+    row, column = int(down), math.floor(along)
+    lower, right = down - row, along - column
+    below = min(row + 1, height - 1)
+    first, second = int(column) % width, int(column + 1) % width
+    r = g = b = 0.0
+    for line, part in ((row, 1.0 - lower), (below, lower)):
+        for place, share in ((first, 1.0 - right), (second, right)):
+            r += part * share * radiance[line, place, 0]
+            g += part * share * radiance[line, place, 1]
+            b += part * share * radiance[line, place, 2]
+    return r, g, b
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_radiance(radiance: Radiance, directions: FloatArray, found: Radiance) -> None:
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]

@@ -31,7 +31,10 @@ from pipelines.glass_scratches.drawing.vectors import (
     set_row,
     stepped,
 )
-from pipelines.light.environment_lookup import radiance_from_direction
+from pipelines.light.environment_lookup import (
+    radiance_from_direction,
+    smooth_radiance_from_direction,
+)
 from pipelines.light.environment_sampling import direction_pdf
 
 DEEPEST = 24
@@ -51,12 +54,14 @@ def advance_paths(first, last, glass, paths, hits, depth, results):  # type: ign
 
 @njit(cache=True, nogil=True)
 def _add_environment(glass, paths, i, results):  # type: ignore[no-untyped-def]
-    """The environment's radiance; shared by the balance heuristic where shadow rays look for it."""
+    """The environment's radiance: as it is looked at, or, where shadow rays look for it, that of
+    its texel, shared by the balance heuristic."""
     environment, number = glass.environment, paths.number[i]
     x, y, z = row_vector(paths.direction, i)
-    r, g, b = radiance_from_direction(environment.radiance, x, y, z)
+    r, g, b = smooth_radiance_from_direction(environment.radiance, x, y, z)
     share = 1.0
     if paths.pdf[i] > 0.0 and not glass.uniform:
+        r, g, b = radiance_from_direction(environment.radiance, x, y, z)
         share = paths.pdf[i] / (paths.pdf[i] + direction_pdf(environment.density, x, y, z))
     results.radiance[number, 0] += paths.throughput[i, 0] * r * share
     results.radiance[number, 1] += paths.throughput[i, 1] * g * share

@@ -107,3 +107,26 @@ def test_wrong_arrays_are_refused() -> None:
 
 def test_no_directions_give_no_radiance() -> None:
     assert radiance_from_directions(rough_map(8), np.empty((0, 3))).shape == (0, 3)
+
+
+def test_a_map_that_is_looked_at_is_linear_between_texels() -> None:
+    """Against OpenCV's bilinear remapping of the map, wrapped around; poles end."""
+    import cv2
+
+    from pipelines.light.environment_lookup import smooth_radiance_from_direction
+
+    rng = np.random.default_rng(4)
+    radiance = rng.random((8, 16, 3)).astype(np.float32)
+    ways = rng.normal(size=(500, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    wrapped = np.concatenate([radiance[:, -1:], radiance, radiance[:, :1]], axis=1)
+    wrapped = np.concatenate([wrapped[:1], wrapped, wrapped[-1:]])
+    x = (0.5 - np.arctan2(ways[:, 1], ways[:, 0]) / (2 * np.pi)) * 16 + 0.5
+    y = np.arccos(ways[:, 2]) / np.pi * 8 + 0.5
+    expected = cv2.remap(
+        wrapped, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR
+    ).reshape(-1, 3)
+    found = [smooth_radiance_from_direction(radiance, *way) for way in ways]
+    # OpenCV's weights are multiples of 1/32.
+    np.testing.assert_allclose(found, expected, atol=0.04)
+    assert np.abs(found - np.roll(expected, 1, axis=0)).max() > 0.5

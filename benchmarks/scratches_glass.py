@@ -1,0 +1,166 @@
+"""Figures of walls of glass: laws of the table, Mitsuba's grooves, what table and profile do to
+pictures, and the stage beside traced pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.drawing.colour import to_8bit
+from pipelines.geometry.solid_shapes import glass_teapot, plate
+from pipelines.geometry.solids import Solid
+from pipelines.glass_scratches.drawing.denoising import denoised
+from pipelines.glass_scratches.drawing.frames import (
+    object_cameras,
+    picture_exposure,
+    trace_view,
+)
+from pipelines.glass_scratches.drawing.path_tracing import trace_picture
+from pipelines.glass_scratches.drawing.stage_view import draw_scratched
+from pipelines.glass_scratches.layers.scratch_layers import make_layers
+from pipelines.glass_scratches.layers.settings import LayerSpec
+from pipelines.glass_scratches.scratched_glass import (
+    ScratchedGlass,
+    scratch_material,
+    scratched_glass,
+)
+from pipelines.glass_scratches.tables.bsdf_table import BsdfTable, asymmetry, energy_error
+from pipelines.glass_scratches.tables.glass_table import glass_table
+from pipelines.glass_scratches.tables.profiles import Shape, built_in_profile
+from pipelines.light.environment_sampling import EnvironmentSampler, make_environment_sampler
+from pipelines.light.room import room
+
+INDEX, BINS, RAYS = 1.5, 128, 20_000
+SETTINGS = {
+    "setting_1": LayerSpec(length=0.3, width=0.001, threshold=0.1),
+    "setting_2": LayerSpec(length=0.6, width=0.01, threshold=0.1),
+}
+WALLS = {"even": 1.0, "ground": 0.5, "clear": 0.0}
+"""Roughness."""
+SHAPES: tuple[Shape, ...] = ("v", "u", "trapezoid", "raised")
+MATTERS_SIZE, MATTERS_SAMPLES = 96, 256
+STAGE_SIZE, STAGE_SAMPLES = 180, 256
+
+
+def glass_figures() -> dict[str, Any]:
+    """All of them; docs/scratches.md says what each one means."""
+    from tests.reference.glass_groove import reference_figures
+
+    light = make_environment_sampler(room(1024))
+    return _laws() | _matters(light) | _stage_beside_traced(light) | reference_figures()
+
+
+def _table(shape: Shape, roughness: float, bins: int = BINS) -> BsdfTable:
+    profile = built_in_profile(shape, 10.0, 4.0)
+    return glass_table(profile, bins=bins, index=INDEX, roughness=roughness, rays=RAYS)
+
+
+def _laws() -> dict[str, float]:
+    """Worst of four profiles and three kinds of walls; the null of reciprocity is the table of
+    radiance itself, not over n²."""
+    tables = [_table(shape, roughness, 64) for shape in SHAPES for roughness in WALLS.values()]
+    one = tables[0].rho[0]
+    radiance = one * np.repeat([1.0, INDEX**2], len(one) // 2)
+    return {
+        "energy_error": max(energy_error(table) for table in tables),
+        "reciprocity_error": max(asymmetry(table) for table in tables),
+        "reciprocity_null": float(np.abs(radiance - radiance.T).max() / radiance.max()),
+    }
+
+
+def _matters(light: EnvironmentSampler) -> dict[str, Any]:
+    """Relative change (RMS over mean) of the pixels that show scratches, plate from close, where
+    the table is set to zero and where the V becomes a trapezoid; beside it the noise: the same
+    change from one seed to another."""
+    solid = plate(1.5, 1.1, 0.05)
+    found: dict[str, dict[str, float]] = {"table": {}, "profile": {}, "noise": {}}
+    for setting, spec in SETTINGS.items():
+        layers = make_layers(spec, 3)
+        for walls, roughness in WALLS.items():
+            table = _table("v", roughness)
+            black = table._replace(rho=0 * table.rho, across=0 * table.across)
+            others = {
+                "table": (black, 0),
+                "profile": (_table("trapezoid", roughness), 0),
+                "noise": (table, 1),
+            }
+            shown, scratched = _close_up(solid, table, layers, light, 0)
+            seen = scratched > 0.2 * scratched.max()
+            for name, (other, seed) in others.items():
+                changed, _ = _close_up(solid, other, layers, light, seed)
+                change = np.sqrt(np.mean((changed - shown)[seen] ** 2)) / shown[seen].mean()
+                found[name][f"{setting}_{walls}"] = float(change)
+    return {
+        "table_matters": min(found["table"].values()),
+        "profile_matters": min(found["profile"].values()),
+        "matters_noise": max(found["noise"].values()),
+        "matters": found,
+    }
+
+
+def _close_up(
+    solid: Solid, table: BsdfTable, layers: Any, light: EnvironmentSampler, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    """Luminance of 8 x 8 pixels' means, and the share of paths that met scratches."""
+    glass = scratched_glass(solid, scratch_material(table, layers))
+    traced = trace_picture(
+        glass.solid,
+        glass.surface,
+        light,
+        object_cameras(solid)[1],
+        width=MATTERS_SIZE,
+        height=MATTERS_SIZE,
+        samples=MATTERS_SAMPLES,
+        seed=seed,
+    )
+    return _blocks(traced.radiance.mean(axis=2)), _blocks(traced.scratched)
+
+
+def _blocks(picture: NDArray[Any]) -> NDArray[Any]:
+    side = len(picture) // 8
+    return picture.reshape(side, 8, side, 8).mean(axis=(1, 3), dtype=np.float64)
+
+
+def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
+    """FLIP of the stage's pictures against traced and denoised ones: plate and teapot, far and
+    close, walls of each kind; null: the stage without the glass."""
+    layers = make_layers(SETTINGS["setting_2"], 3)
+    solids = {"plate": plate(1.5, 1.1, 0.05), "teapot": glass_teapot(14, 0.05)}
+    flips: dict[str, float] = {}
+    nulls: dict[str, float] = {}
+    for walls, roughness in WALLS.items():
+        material = scratch_material(_table("v", roughness), layers)
+        for name, solid in solids.items():
+            glass = scratched_glass(solid, material)
+            for view in range(2):
+                one, null = _flips(glass, light, view)
+                key = f"{name}_{'far' if view == 0 else 'close'}_{walls}"
+                flips[key], nulls[key] = one, null
+    return {
+        "stage_vs_traced_flip": max(flips.values()),
+        "stage_vs_traced_flip_mean": float(np.mean(list(flips.values()))),
+        "stage_vs_traced_null": min(nulls.values()),
+        "stage_views": {"flip": flips, "null": nulls},
+    }
+
+
+def _flips(glass: ScratchedGlass, light: EnvironmentSampler, view: int) -> tuple[float, float]:
+    from flip_evaluator import evaluate
+
+    camera = object_cameras(glass.solid)[view]
+    traced = denoised(trace_view(glass, light, camera, size=STAGE_SIZE, samples=STAGE_SAMPLES))
+    stage = draw_scratched(
+        glass.actor, light, camera, width=STAGE_SIZE, height=STAGE_SIZE, supersampling=2
+    )[..., :3]
+    empty = np.roll(stage, STAGE_SIZE // 2, axis=1)
+    exposure = picture_exposure(traced)
+
+    def shown(radiance: NDArray[Any]) -> NDArray[np.float32]:
+        return to_8bit(radiance * exposure).astype(np.float32) / 255.0
+
+    return tuple(
+        float(evaluate(shown(traced), shown(other), "LDR", inputsRGB=True)[1])
+        for other in (stage, empty)
+    )  # type: ignore[return-value]
