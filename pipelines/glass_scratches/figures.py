@@ -111,7 +111,6 @@ def paths_z_rms(
             rays=_PATHS,
             paths_per_ray=1,
             albedo=albedo,
-            roughness=1.0,
             seed=_OTHER_SEED,
             incidence=chosen,
         ).leaving

@@ -1,10 +1,7 @@
-"""The scratch BRDF by paths, as the paper makes it (section 3.1, Eq. 1), for any roughness.
+"""The scratch BRDF by paths, as the paper makes it (section 3.1, Eq. 1).
 
-A bounce is described by the sine of its angle to the facet's normal. Light that is scattered evenly
-leaves with a sine uniform in (-1, 1), whatever it came with; a mirror keeps the sine. Between the
-two (which the paper leaves open) the sine of the mirror is blurred by a Gaussian, folded back at
-+-1: a kernel that is symmetric and loses nothing, so reciprocity and the white furnace hold for
-every roughness, with Lambert's law and the mirror as its ends.
+A bounce is described by the sine of its angle to the facet's normal: light that is scattered evenly
+leaves with a sine uniform in (-1, 1), whatever it came with.
 """
 
 from __future__ import annotations
@@ -17,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
 from pipelines.glass_scratches.tables.random_numbers import next_number
-from pipelines.glass_scratches.tables.walls import bounce_blur, check_albedo
+from pipelines.glass_scratches.tables.walls import check_albedo
 
 PLACES = 16
 """Parts of the opening's width for which paths are counted apart."""
@@ -49,7 +46,6 @@ def shoot_paths(
     rays: int,
     paths_per_ray: int,
     albedo: float,
-    roughness: float,
     seed: int,
     incidence: NDArray[np.int64] | None = None,
 ) -> PathCounts:
@@ -58,11 +54,10 @@ def shoot_paths(
     A ray enters at a random place of the opening, from a random direction of its bin (by the
     cosine); all its paths start there. ``incidence`` limits the bins that are shot from; the others
     count no paths. Walls keep a path with probability 1 - albedo. The result depends on the seed
-    alone, not on the number of threads. Raises ValueError for an
-    albedo or a roughness outside [0, 1].
+    alone, not on the number of threads. Raises ValueError for an albedo outside [0, 1].
     """
     check_albedo(albedo)
-    walls = _walls(profile, albedo, bounce_blur(roughness))
+    walls = _walls(profile, albedo)
     chosen = np.arange(bins) if incidence is None else incidence
     counts = PathCounts(
         np.zeros((bins, PLACES, bins), np.int64),
@@ -107,18 +102,9 @@ def table_of_counts(counts: PathCounts) -> PathTable:
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _folded(sine):  # type: ignore[no-untyped-def]
-    """A number reflected at -1 and 1 until it lies between."""
-    turn = np.fmod(sine + 1.0, 4.0)
-    if turn < 0.0:
-        turn += 4.0
-    return turn - 1.0 if turn <= 2.0 else 3.0 - turn
-
-
 class _Walls(NamedTuple):
     """The pieces of a profile (P,): where each begins, its direction, its length; and what they do
-    to light: the part that they give back, the blur of its sine."""
+    to light: the part that they give back."""
 
     x: NDArray[np.float64]
     y: NDArray[np.float64]
@@ -127,7 +113,6 @@ class _Walls(NamedTuple):
     length: NDArray[np.float64]
     opening: float
     albedo: float
-    blur: float
 
 
 class _Ray(NamedTuple):
@@ -140,12 +125,12 @@ class _Ray(NamedTuple):
     dy: float
 
 
-def _walls(profile: NDArray[np.float64], albedo: float, blur: float) -> _Walls:
+def _walls(profile: NDArray[np.float64], albedo: float) -> _Walls:
     dx, dy = np.diff(profile, axis=0).T
     length = np.sqrt(dx * dx + dy * dy)
     x, y = profile[:-1].T.copy()
     opening = float(profile[-1, 0] - profile[0, 0])
-    return _Walls(x, y, dx / length, dy / length, length, opening, albedo, blur)
+    return _Walls(x, y, dx / length, dy / length, length, opening, albedo)
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -202,28 +187,14 @@ def _bin_of_path(walls, ray, piece, along, state, bins):  # type: ignore[no-unty
         state, u = next_number(state)
         if u >= walls.albedo:
             return state, _KEPT
-        sine_in = dx * walls.along_x[piece] + dy * walls.along_y[piece]
-        state, sine = _bounced_sine(sine_in, walls.blur, state)
-        bounced = _bounced_ray(walls, piece, along, sine)
+        state, u = next_number(state)
+        bounced = _bounced_ray(walls, piece, along, 2.0 * u - 1.0)
         piece, along = _hit(walls, bounced)
         dx, dy = bounced.dx, bounced.dy
         if piece < 0:
             angle = np.arctan2(dx, max(dy, 0.0))
             return state, min(max(int((angle / np.pi + 0.5) * bins), 0), bins - 1)
     return state, _LOST
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _bounced_sine(sine, blur, state):  # type: ignore[no-untyped-def]
-    """Random state, and the sine after a bounce, to the facet's normal, of the one before."""
-    state, u = next_number(state)
-    if np.isinf(blur):
-        return state, 2.0 * u - 1.0
-    if blur > 0.0:
-        state, v = next_number(state)
-        normal = np.sqrt(-2.0 * np.log(1.0 - u)) * np.cos(2.0 * np.pi * v)
-        sine = _folded(sine + blur * normal)
-    return state, sine
 
 
 @njit(cache=True, nogil=True, inline="always")

@@ -1,4 +1,4 @@
-"""The 2-D scratch table of walls of any roughness, by one interface."""
+"""The scratch paper's 2-D table, exact or by paths, by one interface."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipelines.glass_scratches.tables.radiosity import (
     view_factors,
 )
 from pipelines.glass_scratches.tables.table_2d import Table2D
-from pipelines.glass_scratches.tables.walls import Method, check_roughness, table_method
+from pipelines.glass_scratches.tables.walls import Method
 
 _FINE = 16
 
@@ -22,30 +22,27 @@ def scratch_brdf_table(
     *,
     bins: int,
     albedo: float = 1.0,
-    roughness: float = 1.0,
     method: Method | None = None,
     facets: int = 128,
     rays: int = 20_000,
     paths_per_ray: int = 1,
     seed: int = 0,
 ) -> Table2D:
-    """The table of a profile (P, 2) whose walls have this albedo and roughness.
+    """The table of a profile (P, 2) whose walls have this albedo.
 
-    ``method`` exact solves the linear system of diffuse walls with ``facets`` facets; ``paths``
-    shoots ``rays`` rays a bin, ``paths_per_ray`` paths each (the paper's N, Nr); None takes what
-    `table_method` says. Raises ValueError for an exact table of walls that are not diffuse, and as
-    the two methods do.
+    ``method`` exact, the default, solves the linear system with ``facets`` facets; ``paths`` shoots
+    ``rays`` rays a bin, ``paths_per_ray`` paths each (the paper's N, Nr). Raises ValueError as the
+    two methods do.
 
     >>> from pipelines.glass_scratches.tables.profiles import built_in_profile
     >>> groove = built_in_profile("v", 10.0, 4.0)
-    >>> mirror = scratch_brdf_table(groove, bins=16, roughness=0.0, rays=100)
-    >>> mirror.rho.shape, mirror.across.shape
+    >>> counted = scratch_brdf_table(groove, bins=16, method="paths", rays=100)
+    >>> counted.rho.shape, counted.across.shape
     ((16, 16), (16, 16, 16))
-    >>> bool((mirror.standard_error > 0).any())
+    >>> bool((counted.standard_error > 0).any())
     True
     """
-    check_roughness(roughness)
-    if table_method(method, roughness) == "exact":
+    if method != "paths":
         factors = view_factors(profile, bins, facets)
         solved = solve_radiosity(factors, albedo)
         seen = seen_facets(factors, bins, PLACES * _FINE)
@@ -62,7 +59,6 @@ def scratch_brdf_table(
             rays=rays,
             paths_per_ray=paths_per_ray,
             albedo=albedo,
-            roughness=roughness,
             seed=seed,
         )
     )

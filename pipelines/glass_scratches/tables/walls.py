@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
 Method = Literal["exact", "paths"]
 """How a table is made: by a linear system, or by counting paths."""
 
@@ -19,20 +17,7 @@ def check_albedo(albedo: float) -> None:
 def check_roughness(roughness: float) -> None:
     """Raises ValueError for a roughness outside [0, 1]."""
     if not 0.0 <= roughness <= 1.0:
-        raise ValueError(f"roughness is {roughness:g}; expected 0 (mirror) to 1 (diffuse).")
-
-
-def bounce_blur(roughness: float) -> float:
-    """Standard deviation of the blurred sine of a bounce: 0 for a mirror, infinite for Lambert's
-    law.
-
-    Raises ValueError as :func:`check_roughness`.
-
-    >>> bounce_blur(0.0), bounce_blur(0.5), bounce_blur(1.0)
-    (0.0, 1.0, inf)
-    """
-    check_roughness(roughness)
-    return np.inf if roughness == 1.0 else roughness / (1.0 - roughness)
+        raise ValueError(f"roughness is {roughness:g}; expected 0 (clear) to 1 (diffuse).")
 
 
 def table_method(method: Method | None, roughness: float) -> Method:

@@ -1,4 +1,4 @@
-"""Paths against the exact table, closed forms of mirrors, and what no roughness may break."""
+"""The paper's paths against the exact table, and what no scratch may break."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
-from pipelines.glass_scratches.tables.bins import bin_edges, bin_weights
+from pipelines.glass_scratches.tables.bins import bin_weights
 from pipelines.glass_scratches.tables.monte_carlo import (
     PLACES,
     PathCounts,
-    _folded,
     shoot_paths,
     table_of_counts,
 )
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
 from pipelines.glass_scratches.tables.radiosity import solve_radiosity, view_factors
-from pipelines.glass_scratches.tables.walls import bounce_blur
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +42,6 @@ def paths(
     rays: int = 10_000,
     each: int = 1,
     albedo: float = 1.0,
-    roughness: float = 1.0,
     seed: int = 1,
     incidence: NDArray[np.int64] | None = None,
 ) -> PathCounts:
@@ -55,7 +51,6 @@ def paths(
         rays=rays,
         paths_per_ray=each,
         albedo=albedo,
-        roughness=roughness,
         seed=seed,
         incidence=incidence,
     )
@@ -153,13 +148,12 @@ def test_several_paths_a_ray_have_the_same_mean() -> None:
     assert 20 < (z**2).sum() < 110
 
 
-# ---- every roughness -------------------------------------------------------------------------
+# ---- laws ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", PROFILES)
-@pytest.mark.parametrize("roughness", [0.0, 0.3, 0.7, 1.0])
-def test_white_walls_let_every_path_out(name: str, roughness: float) -> None:
-    counts = paths(PROFILES[name], rays=3000, each=2, roughness=roughness)
+def test_white_walls_let_every_path_out(name: str) -> None:
+    counts = paths(PROFILES[name], rays=3000, each=2)
     np.testing.assert_array_equal(counts.leaving.sum(axis=(1, 2)), 6000)
     assert not counts.kept.any()
     # Rays enter everywhere: the same number in each place but for chance.
@@ -169,133 +163,25 @@ def test_white_walls_let_every_path_out(name: str, roughness: float) -> None:
 
 
 @pytest.mark.parametrize("name", PROFILES)
-@pytest.mark.parametrize("roughness", [0.0, 0.3, 0.7])
-def test_light_and_view_may_be_swapped(name: str, roughness: float) -> None:
+def test_light_and_view_may_be_swapped(name: str) -> None:
     """Of a beam's paths rho w / pi leave: so counts over w are symmetric in the mean."""
-    counts = paths(PROFILES[name], rays=20_000, albedo=0.9, roughness=roughness, seed=5)
+    counts = paths(PROFILES[name], rays=20_000, albedo=0.9, seed=5)
     gone = counts.leaving.sum(axis=1) / bin_weights(BINS)
     spread = counts.leaving.sum(axis=1) / bin_weights(BINS) ** 2
     upper = np.triu_indices(BINS, 1)
     difference, variance = (gone - gone.T)[upper], (spread + spread.T)[upper]
     often = np.minimum(counts.leaving.sum(axis=1), counts.leaving.sum(axis=1).T)[upper] >= 8
-    assert often.sum() > (8 if roughness == 0 else 60)
+    assert often.sum() > 60
     z = difference[often] / np.sqrt(variance[often])
     assert usual((z**2).sum(), int(often.sum()))
-
-
-def test_nearly_diffuse_is_diffuse() -> None:
-    one = paths(roughness=0.999, rays=20_000, seed=6).leaving.sum(axis=1).astype(np.float64)
-    exact = (
-        solve_radiosity(view_factors(V, BINS, 200), 1.0).rho * bin_weights(BINS)[:, None] / np.pi
-    )
-    expected = 20_000 * exact.T
-    z = (one - expected) / np.sqrt(expected)
-    assert usual((z**2).sum(), BINS * (BINS - 1))
-
-
-def test_a_rougher_mirror_spreads_more() -> None:
-    def spread(roughness: float) -> float:
-        made = table_of_counts(paths(RIGHT_ANGLE, roughness=roughness))
-        return float((made.rho > 0.05).sum())
-
-    assert spread(0.0) < spread(0.05) < spread(0.2)
-
-
-# ---- mirrors ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("albedo", [1.0, 0.7])
-def test_a_mirror_in_the_shape_of_a_right_angle_sends_light_back(albedo: float) -> None:
-    """Two bounces return to where the light came from; one alone ends at 90° - phi.
-
-    Of the rays at phi a part tan phi is reflected once only (by unfolding), all beyond 45°.
-    """
-    rays = 20_000
-    counts = paths(RIGHT_ANGLE, rays=rays, roughness=0.0, albedo=albedo, seed=7)
-    leaving = counts.leaving.sum(axis=1)
-    edges = bin_edges(BINS)
-    z = []
-    for column in range(BINS):
-        low, high = sorted(np.abs(edges[column : column + 2]))
-        other = BINS - 1 - (column - BINS // 2) if column >= BINS // 2 else BINS // 2 - 1 - column
-        # Mean of tan over the bin, weighted by cos.
-        once = 1.0
-        if high <= math.pi / 4 + 1e-9:
-            once = (math.cos(low) - math.cos(high)) / (math.sin(high) - math.sin(low))
-        assert leaving[column].sum() == leaving[column, column] + leaving[column, other]
-        for out, share in ((other, albedo * once), (column, albedo**2 * (1 - once))):
-            if share in (0.0, 1.0):
-                assert leaving[column, out] == share * rays
-            else:
-                error = math.sqrt(rays * share * (1 - share))
-                z.append((leaving[column, out] - rays * share) / error)
-    assert len(z) >= BINS
-    # Two counts of one incidence are bound together: a rougher limit than chi square's.
-    assert np.abs(z).max() < norm.isf(1e-5)
-
-
-def test_a_shallow_mirror_reflects_as_a_plane() -> None:
-    """Walls of half a degree: phi to -phi, into the mirrored bin or the one beside it."""
-    counts = paths(built_in_profile("v", 10.0, 0.04), rays=4000, roughness=0.0)
-    leaving = counts.leaving.sum(axis=1)[:, ::-1]
-    assert np.diag(leaving).sum() > 0.85 * leaving.sum()
-    middle = np.diag(leaving)[1:-1] + np.diag(leaving, 1)[1:] + np.diag(leaving, -1)[:-1]
-    np.testing.assert_array_equal(middle, 4000)
-
-
-# ---- the blurred bounce ----------------------------------------------------------------------
-
-
-@njit
-def _fold(values: Floats, found: Floats) -> None:
-    for i in range(len(values)):
-        found[i] = _folded(values[i])
-
-
-def fold(values: Floats) -> Floats:
-    found = np.empty(len(values))
-    _fold(values, found)
-    return found
-
-
-def test_folding_is_a_triangle_wave() -> None:
-    values = np.random.default_rng(8).uniform(-30, 30, 5000)
-    expected = 2 / np.pi * np.arcsin(np.sin(np.pi / 2 * values))
-    np.testing.assert_allclose(fold(values), expected, atol=1e-7)
-    inside = np.linspace(-1, 1, 101)
-    np.testing.assert_allclose(fold(inside), inside, atol=1e-15)
-    np.testing.assert_allclose(fold(np.array([1.25, -1.5, 3.0, 4.5])), [0.75, -0.5, -1.0, 0.5])
-
-
-@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.6])
-def test_the_bounce_is_symmetric_and_keeps_what_is_even(roughness: float) -> None:
-    """Counts from sine to sine, of bounces that come evenly: as many there as back."""
-    rng = np.random.default_rng(9)
-    before = rng.uniform(-1, 1, 200_000)
-    after = fold(before + bounce_blur(roughness) * rng.standard_normal(len(before)))
-    counts, _, _ = np.histogram2d(before, after, bins=12, range=[[-1, 1], [-1, 1]])
-    upper = np.triu_indices(12, 1)
-    there, back = counts[upper], counts.T[upper]
-    often = there + back >= 16
-    z = (there - back)[often] / np.sqrt((there + back)[often])
-    assert usual((z**2).sum(), int(often.sum()))
-    level = len(before) / 12
-    assert usual(((counts.sum(axis=0) - level) ** 2 / level).sum(), 11)
-
-
-def test_the_blur_runs_from_mirror_to_diffuse() -> None:
-    assert bounce_blur(0.0) == 0.0
-    assert bounce_blur(0.5) == 1.0
-    assert bounce_blur(1.0) == math.inf
-    assert (np.diff([bounce_blur(r) for r in np.linspace(0, 1, 50)]) > 0).all()
 
 
 # ---- seeds and threads -----------------------------------------------------------------------
 
 
 def test_equal_seeds_give_equal_counts() -> None:
-    one, again = (paths(rays=500, each=3, roughness=0.4, seed=10) for _ in range(2))
-    other = paths(rays=500, each=3, roughness=0.4, seed=11)
+    one, again = (paths(rays=500, each=3, seed=10) for _ in range(2))
+    other = paths(rays=500, each=3, seed=11)
     for left, right in zip(one, again, strict=True):
         np.testing.assert_array_equal(left, right)
     assert (one.leaving != other.leaving).any()
@@ -324,7 +210,7 @@ print(here.digest())
 
 
 def digest() -> str:
-    counts = paths(rays=400, each=3, albedo=0.9, roughness=0.4, seed=13)
+    counts = paths(rays=400, each=3, albedo=0.9, seed=13)
     return hashlib.sha256(counts.leaving.tobytes() + counts.kept.tobytes()).hexdigest()
 
 
@@ -343,13 +229,6 @@ def test_the_number_of_threads_does_not_matter() -> None:
 
 
 # ---- refusals --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("roughness", [-0.1, 1.1, math.nan])
-def test_a_roughness_outside_0_to_1_is_refused(roughness: float) -> None:
-    message = rf"^roughness is {roughness:g}; expected 0 \(mirror\) to 1 \(diffuse\)\.$"
-    with pytest.raises(ValueError, match=message):
-        paths(rays=1, roughness=roughness)
 
 
 @pytest.mark.parametrize("albedo", [-0.1, 1.1, math.nan])

@@ -22,8 +22,9 @@ from pipelines.glass_scratches.tables.fresnel import (
 from pipelines.glass_scratches.tables.monte_carlo import PLACES
 from pipelines.glass_scratches.tables.profiles import built_in_profile, cut_profile
 from pipelines.glass_scratches.tables.radiosity import leaving_share, solve_radiosity, view_factors
-from pipelines.glass_scratches.tables.scratch_table import Method, scratch_brdf_table
+from pipelines.glass_scratches.tables.scratch_table import scratch_brdf_table
 from pipelines.glass_scratches.tables.table_2d import Table2D
+from pipelines.glass_scratches.tables.walls import Method
 
 BINS = 16
 PAPERS_GAMMA = math.log(1 / 32) / math.log(2 / 3)
@@ -33,14 +34,11 @@ W = cut_profile([(-4, 0), (-2, -3), (0, -0.8), (1.5, -2.2), (4, 0)], "w")
 indices = st.floats(1.01, 3.0)
 
 
-def made(
-    profile: NDArray[np.float64], method: Method, *, roughness: float = 1.0, albedo: float = 0.8
-) -> Table2D:
+def made(profile: NDArray[np.float64], method: Method, *, albedo: float = 0.8) -> Table2D:
     return scratch_brdf_table(
         profile,
         bins=BINS,
         albedo=albedo,
-        roughness=roughness,
         method=method,
         facets=80,
         rays=15_000,
@@ -204,16 +202,7 @@ def test_both_methods_agree_on_every_place(profile: NDArray[np.float64]) -> None
     assert mirrored < 0.9
 
 
-def test_the_exact_method_is_for_diffuse_walls() -> None:
-    message = r"^roughness is 0\.5 with the method exact; expected 1, or the method paths\.$"
-    with pytest.raises(ValueError, match=message):
-        made(V, "exact", roughness=0.5)
-    assert made(V, "paths", roughness=0.5).rho.shape == (BINS, BINS)
-
-
 @pytest.mark.parametrize("method", ["exact", "paths"])
 def test_settings_out_of_range_are_refused(method: Method) -> None:
-    with pytest.raises(ValueError, match=r"^roughness is 1\.5; expected 0 \(mirror\)"):
-        made(V, method, roughness=1.5)
     with pytest.raises(ValueError, match=r"^albedo is 1\.5; expected 0 to 1\.$"):
         made(V, method, albedo=1.5)
