@@ -70,7 +70,7 @@ def _v() -> NDArray[np.float64]:
 
 
 def _laws() -> dict[str, float]:
-    """White furnace and reciprocity of the paper's table, the worst of four profiles at albedo 1."""
+    """White furnace and reciprocity of the paper's table, worst of four profiles, albedo 1."""
     furnace, reciprocity = 0.0, 0.0
     for shape in SHAPES:
         factors = view_factors(built_in_profile(shape, 10.0, 4.0), BINS, FACETS[1])

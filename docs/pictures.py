@@ -54,6 +54,7 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
 """Keys by dimension of what the pictures show."""
 GIVEN: dict[System, dict[str, int]] = {
     STREET: {"frames": 18},
+    SCRATCHES: {"size": 320, "samples": 64},
 }
 """Settings that differ from the demo's."""
 _HEIGHT = 400
@@ -188,7 +189,7 @@ def _scratches(store: VersionedStore) -> None:
     _row("scratches-denoised.png", *_denoised(store))
     _row("scratches-room.jpg", _room())
     _row("scratches-teapot.png", overview["teapot-far"], _beside_stage(store))
-    _row("scratches-specular.png", overview["plate-diffuse-beside-specular"])
+    _row("scratches-walls.png", overview["plate-diffuse-to-clear"])
     _moving("scratches-light.webp", overview["plate-moving-light"])
 
 

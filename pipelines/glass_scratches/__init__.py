@@ -3,10 +3,11 @@
 Sections and equations named in this package are those of the paper that the page cites. In the
 order of the method:
 
-1. ``tables``: a cross-section (``profiles``); its 2-D scratch BRDF table (``scratch_table``),
-   exactly for diffuse walls (``facets``, ``radiosity``) or by paths for any (``monte_carlo``);
-   Fresnel's factor along the scratch (``fresnel``); the BRDF in space and its sampling
-   (``lobe``, ``sampling``).
+1. ``tables``: a cross-section (``profiles``); walls of glass (``groove_walls``), their table
+   exactly where they scatter evenly (``facets``, ``radiosity``, ``glass_radiosity``) or by paths
+   (``glass_paths``): ``glass_table``; the paper's model (``scratch_table``, by ``radiosity`` or
+   ``monte_carlo``; ``fresnel``; ``paper_table``); either as one table of both sides
+   (``bsdf_table``), and the BSDF in space and its sampling (``lobe``, ``sampling``).
 2. ``layers``: scratches in a tile that repeats (``settings``, ``scratch_layers``,
    ``features``), how much they cover (``coverage``), the one at a point (``feature_search``).
 3. ``scratched_glass``: both together, and a solid with them on it.

@@ -10,9 +10,12 @@ leaves into the band.
 from __future__ import annotations
 
 import functools
+import tempfile
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from pipelines.glass_scratches.tables.bins import bin_edges
@@ -26,8 +29,11 @@ BINS, INDEX = 64, 1.5
 LEANS = (0.0, 0.55, 0.82)
 BAND = 4
 """Bins of a band of light."""
-LEAST = 0.02
+LEAST = 0.05
 """Part of a beam that a band gets at least, to be compared."""
+_SHARP = 0.2
+"""Part of a band's light in the bins at its borders, at most: a beam that the border of a band cuts
+is measured badly."""
 PATHS = 1 << 17
 _PARTS = 128
 """Of a view's bin, which is looked at from a direction drawn at random in each of them."""
@@ -77,20 +83,37 @@ def compare(profile: NDArray[np.float64], slope: float, count: int, seed: int) -
         beams, errors = tables[lean]
         bands = [
             first
-            for first in range(0, 2 * BINS, BAND)
-            if beams[first : first + BAND, view].sum() >= LEAST and wanted[first >= BINS] > 0
+            for side in (0, BINS)
+            for first in range(side, side + BINS - BAND + 1)
+            if _can_be_compared(beams[:, view], first) and wanted[side > 0] > 0
         ]
-        for first in rng.permutation(bands)[:3]:
-            wanted[bool(first >= BINS)] -= 1
-            rows = slice(first, first + BAND)
-            traced, error = _traced(solid, len(walls.x), Pair(lean, view, int(first)), rng)
+        chosen = _apart(rng.permutation(bands).tolist())
+        if not chosen:
+            continue
+        pairs = [Pair(lean, view, int(first)) for first in chosen]
+        for pair, (traced, error) in zip(
+            pairs, _traced(solid, len(walls.x), pairs, rng), strict=True
+        ):
+            wanted[pair.light >= BINS] -= 1
+            rows = slice(pair.light, pair.light + BAND)
             own = float(np.sqrt((errors[rows, view] ** 2).sum()))
-            found.append(
-                Compared(
-                    Pair(lean, view, int(first)), traced, error, float(beams[rows, view].sum()), own
-                )
-            )
+            part = float(beams[rows, view].sum())
+            found.append(Compared(pair, traced, error, part, own))
     return found
+
+
+def _can_be_compared(beam: NDArray[np.float64], first: int) -> bool:
+    band = beam[first : first + BAND]
+    return bool(LEAST <= band.sum() <= 0.98 and band[0] + band[-1] <= _SHARP * band.sum())
+
+
+def _apart(bands: list[int]) -> list[int]:
+    """Up to three bands, as many as a picture has colours, that do not overlap."""
+    kept: list[int] = []
+    for first in bands:
+        if len(kept) < 3 and all(abs(first - other) >= BAND for other in kept):
+            kept.append(first)
+    return kept
 
 
 def reference_figures(count: int = 160, seed: int = 0) -> dict[str, float]:
@@ -139,44 +162,54 @@ def _mitsuba() -> Any:
     return mitsuba
 
 
-def _solid(walls: GrooveWalls) -> dict[str, Any]:
-    """Walls in space: all grooves once, and more of them to both sides."""
+def _solid(walls: GrooveWalls) -> Any:
+    """Walls in space: all grooves once, and more of them to both sides, one mesh of Mitsuba's."""
     points = groove_points(walls)
     grooves = len(points)
-    shapes = {}
-    for number in range(-_BESIDE, grooves + _BESIDE):
-        corners = points[number % grooves] + [number, 0.0]
-        for piece in range(len(corners) - 1):
-            start, end = corners[piece], corners[piece + 1]
-            # Seen from the air, up (along v, n) is left of right (along u) … its normal is the
-            # air's.
-            shapes[f"wall {number + _BESIDE} {piece}"] = _rectangle(
-                [0.0, *(start + end) / 2], [_REACH, 0.0, 0.0], [0.0, *(end - start) / 2]
-            )
-    return shapes
-
-
-def _rectangle(middle: list[float], right: list[float], up: list[float]) -> dict[str, Any]:
-    normal = np.cross(right, up)
-    frame = np.eye(4)
-    frame[:3] = np.stack([right, up, normal / np.linalg.norm(normal), middle], axis=1)
-    return {
-        "type": "rectangle",
-        "to_world": _mitsuba().ScalarTransform4f(frame),
-        "material": {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
-    }
+    corners = np.concatenate(
+        [points[n % grooves] + [n, 0.0] for n in range(-_BESIDE, grooves + _BESIDE)]
+    )
+    starts = np.arange(len(corners) - 1)
+    starts = starts[(starts + 1) % points.shape[1] != 0]  # a groove's end is the next one's start
+    flat = np.zeros((2 * len(corners), 3))
+    flat[:, 1:] = np.repeat(corners, 2, axis=0)
+    flat[0::2, 0], flat[1::2, 0] = -_REACH, _REACH
+    one, other = 2 * starts, 2 * (starts + 1)
+    # Counter-clockwise as seen from the air, which is on the left of the way along v.
+    faces = np.concatenate(
+        [
+            np.stack([one, one + 1, other], axis=1),
+            np.stack([one + 1, other + 1, other], axis=1),
+        ]
+    )
+    mi = _mitsuba()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "grooves.ply"
+        trimesh.Trimesh(flat, faces, process=False).export(path)
+        return mi.load_dict(
+            {
+                "type": "ply",
+                "filename": str(path),
+                "face_normals": True,
+                "material": {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
+            }
+        )
 
 
 def _traced(
-    solid: dict[str, Any], grooves: int, pair: Pair, rng: np.random.Generator
-) -> tuple[float, float]:
-    """Part of the view's beam that Mitsuba's paths take into the band, and its standard error."""
+    solid: Any, grooves: int, pairs: list[Pair], rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    """Parts of the view's beam that Mitsuba's paths take into the bands, and their standard errors.
+
+    The pairs have one lean and view; each band has a colour of its own.
+    """
     mi = _mitsuba()
-    inside = pair.view >= BINS
+    lean, view = pairs[0][:2]
+    inside = view >= BINS
     edges = np.sin(bin_edges(BINS))
-    low, high = edges[pair.view % BINS : pair.view % BINS + 2]
+    low, high = edges[view % BINS : view % BINS + 2]
     sines = low + (high - low) * (np.arange(_PARTS) + rng.random(_PARTS)) / _PARTS
-    u = pair.lean / (INDEX if inside else 1.0)
+    u = lean / (INDEX if inside else 1.0)
     across = np.sqrt(1.0 - u * u)
     up = across * np.sqrt(1.0 - sines * sines) * (-1.0 if inside else 1.0)
     views = np.stack([np.full(_PARTS, u), across * sines, up], axis=-1)
@@ -184,26 +217,30 @@ def _traced(
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": -1, "rr_depth": 1 << 20},
-            "light": _band(pair.light),
-            **{f"sensor {number}": _sensor(view, grooves) for number, view in enumerate(views)},
-            **solid,
+            "light": _bands([pair.light for pair in pairs]),
+            **{f"sensor {number}": _sensor(way, grooves) for number, way in enumerate(views)},
+            "grooves": solid,
         },
         optimize=False,
     )
     seeds = rng.integers(1 << 31, size=_PARTS)
     seen = np.array(
         [
-            np.array(mi.render(scene, sensor=number, seed=int(seed))).ravel()[0]
+            np.array(mi.render(scene, sensor=number, seed=int(seed))).reshape(3)
             for number, seed in enumerate(seeds)
         ],
         np.float64,
     )
     # Mitsuba counts radiance, which is n² times as large inside.
-    seen *= (INDEX**2 if pair.light >= BINS else 1.0) / (INDEX**2 if inside else 1.0)
+    seen /= INDEX**2 if inside else 1.0
     # Neighbouring parts differ by their paths, by where in them was looked from, and a little by
     # what is different there.
-    error = np.sqrt(np.square(np.diff(seen)).sum() / 2.0) / _PARTS
-    return float(seen.mean()), float(error)
+    errors = np.sqrt(np.square(np.diff(seen, axis=0)).sum(axis=0) / 2.0) / _PARTS
+    scales = [INDEX**2 if pair.light >= BINS else 1.0 for pair in pairs]
+    return [
+        (float(mean * scale), float(error * scale))
+        for mean, error, scale in zip(seen.mean(axis=0), errors, scales, strict=False)
+    ]
 
 
 def _sensor(view: NDArray[np.float64], grooves: int) -> dict[str, Any]:
@@ -220,25 +257,26 @@ def _sensor(view: NDArray[np.float64], grooves: int) -> dict[str, Any]:
             "width": 1,
             "height": 1,
             "rfilter": {"type": "box"},
-            "pixel_format": "luminance",
+            "pixel_format": "rgb",
             "component_format": "float32",
         },
         "sampler": {"type": "independent", "sample_count": PATHS // _PARTS},
     }
 
 
-def _band(first: int) -> dict[str, Any]:
-    """An environment of radiance 1 in ``BAND`` bins, whatever the lean."""
+def _bands(bands: list[int]) -> dict[str, Any]:
+    """An environment of radiance 1 in ``BAND`` bins, whatever the lean, for each colour."""
     mi = _mitsuba()
-    columns = np.zeros(2 * BINS * _TEXELS, np.float32)
+    columns = np.zeros((2 * BINS * _TEXELS, 3), np.float32)
     # Once around u, from the normal over v: phi outside, then phi inside from the other horizon.
     phi = (np.arange(len(columns)) + 0.5) / len(columns) * 2 * np.pi - np.pi / 2
     outside = phi < np.pi / 2
     bins = np.where(
         outside, (phi / np.pi + 0.5) * BINS, BINS + ((np.pi - phi) / np.pi + 0.5) * BINS
     )
-    columns[(bins >= first) & (bins < first + BAND)] = 1.0
-    image = np.repeat(np.repeat(columns[None, :, None], 4, axis=0), 3, axis=2)
+    for colour, first in enumerate(bands):
+        columns[(bins >= first) & (bins < first + BAND), colour] = 1.0
+    image = np.repeat(columns[None], 4, axis=0)
     # Mitsuba's map turns about its own y, from -z, where it begins, over x: from -v over n, about
     # u.
     turn = np.eye(4)
