@@ -92,6 +92,7 @@ class ScratchedGlass implements LiveView {
     behind.lampRadiance.value.set(...radiance);
     const shown = surface.uniforms;
     shown.sky.value = this.environments.shown.texture;
+    shown.softSky.value = this.environments.shown.soft;
     shown.brightness.value = brightness;
     shown.toSky.value.copy(matrix(turned.clone().invert().multiply(surface.quaternion)));
     shown.lamp.value.set(...light).applyQuaternion(intoGlass);
