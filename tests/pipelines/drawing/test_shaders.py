@@ -58,8 +58,14 @@ _GLASS: dict[str, Any] = {
     "ANGLES": [0.0, 1.5, -0.25],
     "LIGHTS": 64,
     "EYE": [1.0, -2.0, 1e-7],
-    "RELATIVE_INDEX": 1 / 1.5,
-    "BASE_REFLECTANCE": 0.04,
+    "EVENTS": 8,
+    "NEAREST": 1e-4,
+    "INDEX": 1.5,
+    "BINS": 64,
+    "LEANS": 3,
+    "LEAN_VALUES": [0.0, 0.5, 1.0],
+    "KEEPS": True,
+    "TREE_WIDTH": 512,
     "TILE": 0.35,
     "THROUGH": 0.7,
     "TO_SKY": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
@@ -75,7 +81,7 @@ _LATENTS: dict[str, Any] = {
     "LATENT_VECTORS": 6, "TEXELS": [48, 32], "LEVELS": 7, "PARALLAX": [0.1] * 18,
 }  # fmt: skip
 _FUNCTION_VALUES: dict[str, Any] = {
-    **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
+    **_GLASS, **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
 }  # fmt: skip
 CONSTANTS: dict[str, tuple[str, ...]] = {
     "btf_decoder.glsl": ("VECTORS", "LATENT_VECTORS"),
@@ -83,6 +89,8 @@ CONSTANTS: dict[str, tuple[str, ...]] = {
     "lit_lobes.glsl": ("LEAST_VIEW",),
     "ssdf_lookup.glsl": ("SIDE",),
     "lit_distances.glsl": ("LEAST_VIEW", "SIDE", "LIGHTS"),
+    "scratch_table.glsl": ("BINS", "LEANS", "LEAN_VALUES", "KEEPS", "INDEX"),
+    "triangle_tree.glsl": ("TREE_WIDTH",),
 }
 """Names in capitals of files of functions."""
 _LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0, "EDGES_FETCHED": False}
@@ -141,6 +149,7 @@ STAGES: list[tuple[str, dict[str, Any]]] = [
     *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
     ("fur_laid", _FUR_LAID),
     ("scratched_glass", _GLASS),
+    ("scratched_glass", _GLASS | {"KEEPS": False, "LEANS": 1, "LEAN_VALUES": [0.0]}),
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
     ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
     ("lit", _LIT | _GLOSSY),
@@ -430,3 +439,19 @@ def test_fan_and_the_views_beside_a_viewer() -> None:
         between = np.interp(position, stored, np.arange(len(stored)))
         np.testing.assert_allclose(views[:, 0] + views[:, 2], between, atol=1e-4)
         assert set(views[:, 1] - views[:, 0]) <= {0.0, 1.0}
+
+
+def test_fresnel() -> None:
+    """By the amplitudes' ratios of the two angles (Hecht, Optics, section 4.6)."""
+    ratio, cosine = np.meshgrid([1 / 1.5, 1.5, 1 / 1.8], np.linspace(0.01, 0.999, 60))
+    given = np.stack([cosine.ravel(), ratio.ravel()], axis=1)
+    found = evaluated("fresnel.glsl", "vec3(fresnel(given.x, given.y), 0.0)", given)
+    incoming, sine = np.arccos(given[:, 0]), np.sin(np.arccos(given[:, 0])) * given[:, 1]
+    total = sine >= 1.0
+    outgoing = np.arcsin(np.minimum(sine, 1.0))
+    across = np.sin(incoming - outgoing) / np.sin(incoming + outgoing)
+    along = np.tan(incoming - outgoing) / np.tan(incoming + outgoing)
+    expected = np.where(total, 1.0, (across**2 + along**2) / 2)
+    assert total.any()
+    np.testing.assert_allclose(found[:, 0], expected, atol=2e-5)
+    np.testing.assert_allclose(found[:, 1], np.where(total, 0.0, np.cos(outgoing)), atol=2e-4)
