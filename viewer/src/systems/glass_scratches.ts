@@ -99,7 +99,7 @@ class ScratchedGlass implements LiveView {
     shown.lampRadiance.value.set(...radiance);
     shown.eye.value.copy(eyeOf(camera)).applyQuaternion(intoGlass);
     shown.tileSide.value = tile;
-    shown.through.value = brightness * this.environments.shown.through;
+    shown.allAround.value = brightness * this.environments.shown.through;
     shown.strength.value = strength;
     shown.coveredA.value.fromArray(this.covered(0));
     shown.coveredB.value.fromArray(this.covered(4));

@@ -65,7 +65,7 @@ export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Gl
       LAMP_EDGE: edge,
       EYE: "eye",
       TILE: "tileSide",
-      THROUGH: "through",
+      THROUGH: "allAround", // not `through`, which the shader has of its own
       TO_SKY: "toSky",
       LAMP: "lamp",
       LAMP_RADIANCE: "lampRadiance",
@@ -88,7 +88,7 @@ export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Gl
       eye: { type: "vec3", value: new THREE.Vector3() },
       brightness: { type: "float", value: 1 },
       tileSide: { type: "float", value: 1 },
-      through: { type: "float", value: 0 },
+      allAround: { type: "float", value: 0 },
       toSky: { type: "mat3", value: new THREE.Matrix3() },
       lamp: { type: "vec3", value: new THREE.Vector3(0, 0, 1) },
       lampRadiance: { type: "vec3", value: new THREE.Vector3() },
