@@ -90,7 +90,7 @@ def test_a_package_of_another_schema_is_refused(
     open_viewer: Callable[..., Any], tmp_path: Path
 ) -> None:
     old = tmp_path / "old.tsuya"
-    content = write_package(replace(PACKAGE, version=1), glass_contents(glass_values()))
+    content = write_package(replace(PACKAGE, number=1), glass_contents(glass_values()))
     old.write_bytes(content)
     viewer = open_viewer(old, allowed="schema is 1")
     viewer.page.wait_for_selector("text=schema is 1; expected 2: make the package again")

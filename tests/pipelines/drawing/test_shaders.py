@@ -20,6 +20,7 @@ from pipelines.drawing import glsl
 from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.glsl import SHADERS, Shader, shader_source, surface_shader
 from pipelines.drawing.stage import Stage, orbit, surface, texture
+from pipelines.geometry.triangle_tree import TREE_WIDTH, triangle_tree
 from pipelines.light.directions import stereographic_of_vectors
 from pipelines.photo_fur.laid_fur import constants
 from pipelines.ssdf_lighting.distances.edge_share import edge_share
@@ -346,23 +347,35 @@ def test_marked_loops_are_written_out(folder: Path) -> None:
 # ---- functions -------------------------------------------------------------------------------
 
 
-def evaluated(file: str, expression: str, given: NDArray[np.floating]) -> NDArray[np.float32]:
-    """A vec3 of GLSL for each row of (n, k), k <= 4, which it has under the name ``given``."""
+def evaluated(
+    file: str,
+    expression: str,
+    given: NDArray[np.floating],
+    *,
+    before: str = "",
+    pictures: dict[str, NDArray[np.float32]] | None = None,
+    **values: Any,
+) -> NDArray[np.float32]:
+    """A vec3 of GLSL for each row of (n, k), k <= 4, which it has under the name ``given``;
+    ``before``: statements; ``pictures`` of floats, row 0 at v = 0, and ``values`` of the file."""
     rows = np.zeros((1, len(given), 4), np.float32)
     rows[0, :, : given.shape[1]] = given
     shader = Shader(
         fragment={
-            "TCoord::Dec": f"//VTK::TCoord::Dec\n{shader_source(file)}",
+            "TCoord::Dec": f"//VTK::TCoord::Dec\n{shader_source(file, **values)}",
             "Color::Impl": "//VTK::Color::Impl\n"
             "  vec4 given = texelFetch(inputs, ivec2(gl_FragCoord.xy), 0);\n"
-            f"  diffuseColor = {expression};\n",
+            f"{before}  diffuseColor = {expression};\n",
         }
     )
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [len(given), 1.0, 1.0]
     square = surface(
         corners,
         [[0, 1, 2], [0, 2, 3]],
-        textures={"inputs": texture(rows, interpolate=False)},
+        textures={
+            name: texture(np.ascontiguousarray(picture[::-1]), interpolate=False)
+            for name, picture in {"inputs": rows, **(pictures or {})}.items()
+        },
         shader=shader,
         lit=False,
     )
@@ -455,3 +468,40 @@ def test_fresnel() -> None:
     assert total.any()
     np.testing.assert_allclose(found[:, 0], expected, atol=2e-5)
     np.testing.assert_allclose(found[:, 1], np.where(total, 0.0, np.cos(outgoing)), atol=2e-4)
+
+
+def test_a_ray_meets_the_first_triangle_of_the_tree() -> None:
+    """All triangles asked one by one, by Cramer's rule."""
+    rng = np.random.default_rng(5)
+    places = (rng.normal(size=(90, 1, 3)) + 0.4 * rng.normal(size=(90, 3, 3))).astype(np.float32)
+    tree = triangle_tree(places, places)
+    rays = directions(600)
+    call = (
+        "  float distance;\n  vec2 place;\n  int met = firstTriangle("
+        "tree, corners, vec3(0.1, 0.2, 0.3), given.xyz, 1e-4, distance, place);\n"
+    )
+    found = evaluated(
+        "triangle_tree.glsl",
+        "vec3(met, distance, place.x)",
+        rays,
+        before=call,
+        pictures={"tree": tree.nodes, "corners": tree.corners},
+        TREE_WIDTH=TREE_WIDTH,
+    )
+    a, b, c = np.moveaxis(places[tree.order].astype(float), 1, 0)
+    sides = np.stack([b - a, c - a, np.zeros_like(a)], axis=-1)
+    matrices = np.broadcast_to(sides, (len(rays), *sides.shape)).copy()
+    matrices[..., 2] = -rays[:, None]
+    u, v, distance = np.moveaxis(
+        np.linalg.solve(matrices, ([0.1, 0.2, 0.3] - a)[None, ..., None])[..., 0], -1, 0
+    )
+    distance[(u < 0) | (v < 0) | (u + v > 1) | (distance < 1e-4)] = np.inf
+    first = np.argmin(distance, axis=1)
+    hit = np.isfinite(distance.min(axis=1))
+    assert 100 < hit.sum() < 590
+    same = found[:, 0] == np.where(hit, first, -1)
+    assert same.mean() > 0.99  # others pass within a rounding of an edge
+    both = same & hit
+    rows = np.arange(len(rays))[both], first[both]
+    np.testing.assert_allclose(found[both, 1], distance[rows], rtol=1e-4)
+    np.testing.assert_allclose(found[both, 2], u[rows], atol=1e-3)
