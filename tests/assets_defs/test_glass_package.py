@@ -78,7 +78,7 @@ def test_a_package_tells_sources_figures_lineage_and_views(house: Any) -> None:
     figures = {figure["name"]: figure for figure in meta["figures"]}
     assert 0 <= figures["Light that the table loses, at most"]["value"] < 1e-6
     assert np.isclose(figures["Part of the light that walls do not keep, mean"]["value"], 1.0)
-    table = house.workspace.store.open(SCRATCHES.slot("scratch_table", keys))
+    table = house.workspace.store.open(SCRATCHES.slot("scratch_table", {"setting": "setting-2"}))
     assert np.allclose(package.array("table"), table["rho"], rtol=1e-3, atol=1e-6)
     assert package.array("leans").tolist() == [0.0]
     assert package.parameter("keeps_lean") is False
