@@ -76,8 +76,12 @@ def test_a_package_tells_sources_figures_lineage_and_views(house: Any) -> None:
     assert [source["name"] for source in meta["source"]] == ["setting-2", "plate", "room"]
     assert {step["asset"] for step in meta["lineage"]} == set(SCRATCHES.plans) - {"glass_package"}
     figures = {figure["name"]: figure for figure in meta["figures"]}
-    gamma = figures["Gamma, straight on"]
-    assert np.isclose(gamma["value"], gamma["paper"]["value"], atol=1e-4)
+    assert 0 <= figures["Light that the table loses, at most"]["value"] < 1e-6
+    assert np.isclose(figures["Part of the light that walls do not keep, mean"]["value"], 1.0)
+    table = house.workspace.store.open(SCRATCHES.slot("scratch_table", {"setting": "setting-2"}))
+    assert np.allclose(package.array("table"), table["rho"], rtol=1e-3, atol=1e-6)
+    assert package.array("leans").tolist() == [0.0]
+    assert package.parameter("keeps_lean") is False
     poster = package.picture("poster").astype(float)
     assert poster.shape == (480, 640, 3)
     assert poster.std() > 10

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,16 @@ import pytest
 from numpy.typing import NDArray
 
 from assets_defs.glass_scratches.graph import SCRATCHES
-from storage.packages import Package, read_package
+from storage.packages import Package, read_package, write_package
+from storage.packages.glass_scratches import PACKAGE
 from tests.assets_defs.conftest import house, make_house
+from tests.tsuya.exports.test_scratch_tables import glass_contents, glass_values
 from tests.viewer.made_packages import made_package, mean_difference
 
 __all__ = ["house", "make_house"]
 KEYS = {"setting": "setting-2", "object": "plate"}
-LEAST_PSNR = 40.0
+CLEAR = {"setting": "clear", "object": "plate"}
+LEAST_PSNR = 46.0
 SMALL = (64, 48)
 CHANGES: dict[str, Any] = {
     "tilt": -25,
@@ -43,6 +47,13 @@ def package(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_package(house, SCRATCHES, KEYS, path)
 
 
+@pytest.fixture(scope="module")
+def clear(house: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One of scratches whose walls keep the lean."""
+    path = tmp_path_factory.mktemp("package") / "clear.tsuya"
+    return made_package(house, SCRATCHES, CLEAR, path)
+
+
 @pytest.fixture
 def opened(package: Path) -> Package:
     return read_package(package)
@@ -64,6 +75,25 @@ def test_pictures_are_the_stages(
     ]
     for null in nulls:
         assert viewer.psnr(opened, close, **null) < LEAST_PSNR - 2, null
+
+
+def test_clear_walls_are_the_stages(clear: Path, open_viewer: Callable[..., Any]) -> None:
+    viewer, opened = open_viewer(clear).ready(), read_package(clear)
+    assert opened.parameter("keeps_lean") is True
+    for view in opened.meta["views"]:
+        assert viewer.psnr(opened, view) >= LEAST_PSNR, view["name"]
+        for null in ({"strength": 0.0}, {"tile": 1.3}, {"layer_1": False}):
+            assert viewer.psnr(opened, view, **null) < LEAST_PSNR - 8, (view["name"], null)
+
+
+def test_a_package_of_another_schema_is_refused(
+    open_viewer: Callable[..., Any], tmp_path: Path
+) -> None:
+    old = tmp_path / "old.tsuya"
+    content = write_package(replace(PACKAGE, number=1), glass_contents(glass_values()))
+    old.write_bytes(content)
+    viewer = open_viewer(old, allowed="schema is 1")
+    viewer.page.wait_for_selector("text=schema is 1; expected 2: make the package again")
 
 
 def test_what_is_set_changes_the_picture(package: Path, open_viewer: Callable[..., Any]) -> None:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 from storage.packages import Package
 from tsuya.exports.format import Format, Notes
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _DOCUMENT = """\
 <?xml version="1.0"?>
@@ -72,7 +77,8 @@ def write_glass(package: Package, target: Path) -> Notes:
     # Row 0 of the package lies at v = 0, that of a picture at the top.
     codes = np.rint(covered[::-1] * 255).astype(np.uint8)
     (target / "coverage.png").write_bytes(bytes(imagecodecs.png_encode(codes)))
-    roughness = float(package.parameter("roughness"))
+    table, index = package.array("table"), float(package.parameter("refractive_index"))
+    roughness = scratch_roughness(table[0].astype(np.float64), index)
     nodes = [
         _picture("coverage", "float", "coverage.png"),
         '  <multiply name="roughness" type="float">\n'
@@ -81,16 +87,41 @@ def write_glass(package: Package, target: Path) -> Notes:
     ]
     inputs = [
         ("base", "float", 'value="0"'),
-        ("specular_IOR", "float", f'value="{float(package.parameter("refractive_index")):.9g}"'),
+        ("specular_IOR", "float", f'value="{index:.9g}"'),
         ("specular_roughness", "float", 'nodename="roughness"'),
         ("transmission", "float", 'value="1"'),
     ]
     _write(target, package, nodes, inputs)
     return (
-        "Scratches are glass that is rough where they lie: the scratch's table, its colour-free "
+        "Scratches are glass that is rough where they lie: the scratch's table, its "
         "lobes and the directions of layers are not in it; `--to mitsuba` has them.",
         "coverage.png is a tile for texture coordinates 0 to 1; objects of the package have none.",
     )
+
+
+def scratch_roughness(rho: NDArray[np.float64], index: float) -> float:
+    """`specular_roughness` of ground glass that spreads light as a scratch does, of its table
+    (2 M, 2 M) of lean 0.
+
+    A wall of slope m bends light that falls straight on the glass to the sine m (1 - 1 / n), for
+    small m. So the spread of what the table lets through is a variance of slopes, which for
+    scratches in all directions is alpha² of a microfacet surface; alpha is the roughness' square.
+    At most 1.
+
+    >>> import numpy as np
+    >>> scratch_roughness(np.ones((32, 32)), 1.5)  # walls that scatter evenly
+    1.0
+    """
+    import numpy as np
+
+    bins = len(rho) // 2
+    edges = np.sin(np.linspace(-np.pi / 2, np.pi / 2, bins + 1))
+    # Seen straight on: from between the two bins in the middle.
+    let_through = rho[bins // 2 - 1 : bins // 2 + 1, bins:].mean(axis=0) * np.diff(edges)
+    sine2 = (edges[1:] ** 2 + edges[1:] * edges[:-1] + edges[:-1] ** 2) / 3
+    spread = float(let_through @ sine2 / max(let_through.sum(), 1e-30))
+    alpha = float(np.sqrt(spread)) / (1.0 - 1.0 / index)
+    return min(1.0, float(np.sqrt(alpha)))
 
 
 def _picture(name: str, kind: str, file: str, space: str = "") -> str:

@@ -18,34 +18,41 @@ _README = """\
 
 Arrays are as docs/packages.md has them; phi is the angle across a scratch, from -90 to 90 degrees.
 
-scratch_table   rho_m(phi_o, phi_i): row o, column i; half floats
-leaning         over phi_o: Fresnel's factor at theta = 0; the exponent gamma (Eq. 2 and 4)
+scratch_table   rho(phi_o, phi_i): row o, column i, of M bins outside, then M inside;
+                a table for each lean, one below the other; half floats
+leans           of each table: a direction's component along the scratch times the refractive index
+                where it is: {leans}
 coverage        a layer each: the part of a texel that scratches cover, 0 to 1; row 0 is at v = 0
 angles          direction of each layer's scratches, radians: {angles}
 
 refractive index {refractive_index}, roughness of the walls {roughness}, side of a tile {tile}
+walls keep the lean: {keeps}
 
-A scratch reflects 2 F / pi^2 * rho_m, F = R + (1 - R) F0, R = (2 theta / pi)^gamma; theta is the
-angle between the view and the plane across the scratch.
+What a view in bin o gets from bin i is the part rho w r / pi of radiance over n². w is the
+difference of the sines of the bin's ends. r is 1 outside; inside it is n² where walls forget the
+lean s, sqrt((n² - s²) / (1 - s²)) where they keep it. There the last table is that of leans from 1
+on, which are inside alone: its r is 1.
 """
-_PARAMETERS = ("refractive_index", "roughness", "tile")
+_PARAMETERS = ("refractive_index", "roughness", "keeps_lean", "tile")
 
 
 def write_exr(package: Package, target: Path) -> Notes:
-    """A folder: `scratch_table.exr`, `leaning.exr`, `coverage.exr`, and what they are as text.
+    """A folder: `scratch_table.exr`, `coverage.exr`, and what they are as text.
 
     Raises BadInput.
     """
     arrays = scratch_arrays(package)
     target.mkdir(parents=True)
-    _write_channels(target / "scratch_table.exr", {"Y": arrays["table"]})
-    factor, gamma = arrays["leaning"]
-    _write_channels(target / "leaning.exr", {"F0": factor[None], "gamma": gamma[None]})
+    table = arrays["table"]
+    _write_channels(target / "scratch_table.exr", {"Y": table.reshape(-1, table.shape[2])})
     layers = {f"layer_{n + 1}": layer for n, layer in enumerate(arrays["coverage"])}
     _write_channels(target / "coverage.exr", layers)
-    angles = ", ".join(f"{angle:.6f}" for angle in arrays["angles"])
-    values = {name: package.parameter(name) for name in _PARAMETERS}
-    text = _README.format(title=package.meta["title"], angles=angles, **values)
+    values: dict[str, Any] = {name: package.parameter(name) for name in _PARAMETERS}
+    values |= {
+        name: ", ".join(f"{value:.6f}" for value in arrays[name]) for name in ("angles", "leans")
+    }
+    keeps = "yes" if values.pop("keeps_lean") else "no"
+    text = _README.format(title=package.meta["title"], keeps=keeps, **values)
     (target / "readme.txt").write_text(text, "utf-8")
     return ("Coverage has 8 bits, as in the package: up to 0.002 off what the graph made.",)
 
@@ -61,7 +68,7 @@ def write_npz(package: Package, target: Path) -> Notes:
 
 
 def scratch_arrays(package: Package) -> dict[str, NDArray[np.floating[Any]]]:
-    """table (M, M) float16, leaning (2, M), angles (L,), coverage (L, R, R) float32 in [0, 1].
+    """table (S, 2 M, 2 M) float16, leans (S,), angles (L,), coverage (L, R, R) float32 in [0, 1].
 
     Raises BadInput.
     """
@@ -70,7 +77,7 @@ def scratch_arrays(package: Package) -> dict[str, NDArray[np.floating[Any]]]:
     codes = package.textures("coverage")[..., 0]
     return {
         "table": package.array("table"),
-        "leaning": package.array("leaning"),
+        "leans": package.array("leans"),
         "angles": package.array("angles"),
         "coverage": codes.astype(np.float32) / np.float32(255.0),
     }

@@ -2,7 +2,9 @@ import { describe, expect, it } from "vitest";
 import { Environment, lampRadiance, lampSteradians } from "../src/systems/glass_scratches/environment";
 import { environmentOf } from "../src/systems/glass_scratches/environment_file";
 import { drawnLights, LIGHTS, luminance, meanLuminance, typicalLuminance } from "../src/systems/glass_scratches/lights";
+import { smaller, softMap } from "../src/systems/glass_scratches/means";
 import { controlsOf, stateOf, withState, type Settings } from "../src/systems/glass_scratches/state";
+import { TREE_WIDTH, triangleTree } from "../src/systems/glass_scratches/triangle_tree";
 import fixture from "./glass_scratches_lights.json";
 
 const map = { height: fixture.height, data: Float32Array.from(fixture.radiance) };
@@ -26,6 +28,43 @@ describe("lights of an environment", () => {
     const radiance = lampRadiance(3, meanLuminance(map), edge, colour);
     expect(luminance(radiance) * lampSteradians(edge)).toBeCloseTo(3 * Math.PI * meanLuminance(map), 9);
     radiance.forEach((value, n) => expect(value / fixture.lamp.radiance[n]).toBeCloseTo(1, 5));
+  });
+});
+
+describe("a soft environment", () => {
+  it("has the means of areas that the stage has", () => {
+    const { rows, radiance } = fixture.soft;
+    const found = smaller(map.data, [16, 32], [rows, 2 * rows]);
+    expect(found.length).toBe(radiance.length);
+    found.forEach((value, n) => expect(value).toBeCloseTo(radiance[n], 3));
+  });
+
+  it("is the environment where that is no larger", () => {
+    expect(softMap(map, 64)).toEqual(map);
+    expect(softMap(map, 4).data.length).toBe(3 * 4 * 8);
+  });
+});
+
+describe("the tree of triangles", () => {
+  const { places, normals, nodes, corners } = fixture.tree;
+  const [given, beside] = [Float32Array.from(places), Float32Array.from(normals)];
+
+  it("is the stage's, node for node", () => {
+    const tree = triangleTree(given, beside);
+    expect(tree.nodes.length).toBe(4 * TREE_WIDTH);
+    expect(tree.nodes.subarray(0, nodes.length)).toEqual(Float32Array.from(nodes));
+    expect(tree.corners.subarray(0, corners.length)).toEqual(Float32Array.from(corners));
+  });
+
+  it("is another of other triangles", () => {
+    const tree = triangleTree(given.map((value, n) => (n < 9 ? -value : value)), beside);
+    expect(tree.nodes.subarray(0, nodes.length)).not.toEqual(Float32Array.from(nodes));
+  });
+
+  it("fills whole rows of texels, and refuses what it cannot hold", () => {
+    const many = Float32Array.from({ length: 9 * 300 }, (_, n) => Math.sin(n * n));
+    expect(triangleTree(many, many).corners.length).toBe(4 * TREE_WIDTH * 4);
+    expect(() => triangleTree(new Float32Array(0), new Float32Array(0))).toThrow("expected 9 each of both");
   });
 });
 

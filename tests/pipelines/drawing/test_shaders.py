@@ -20,6 +20,7 @@ from pipelines.drawing import glsl
 from pipelines.drawing.colour import decode_srgb
 from pipelines.drawing.glsl import SHADERS, Shader, shader_source, surface_shader
 from pipelines.drawing.stage import Stage, orbit, surface, texture
+from pipelines.geometry.triangle_tree import TREE_WIDTH, triangle_tree
 from pipelines.light.directions import stereographic_of_vectors
 from pipelines.photo_fur.laid_fur import constants
 from pipelines.ssdf_lighting.distances.edge_share import edge_share
@@ -58,8 +59,14 @@ _GLASS: dict[str, Any] = {
     "ANGLES": [0.0, 1.5, -0.25],
     "LIGHTS": 64,
     "EYE": [1.0, -2.0, 1e-7],
-    "RELATIVE_INDEX": 1 / 1.5,
-    "BASE_REFLECTANCE": 0.04,
+    "EVENTS": 8,
+    "NEAREST": 1e-4,
+    "INDEX": 1.5,
+    "BINS": 64,
+    "LEANS": 3,
+    "LEAN_VALUES": [0.0, 0.5, 1.0],
+    "KEEPS": True,
+    "TREE_WIDTH": 512,
     "TILE": 0.35,
     "THROUGH": 0.7,
     "TO_SKY": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
@@ -75,7 +82,7 @@ _LATENTS: dict[str, Any] = {
     "LATENT_VECTORS": 6, "TEXELS": [48, 32], "LEVELS": 7, "PARALLAX": [0.1] * 18,
 }  # fmt: skip
 _FUNCTION_VALUES: dict[str, Any] = {
-    **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
+    **_GLASS, **_LATENTS, "VECTORS": 27, "LEAST_VIEW": 0.05, "SIDE": 64, "LIGHTS": 5,
 }  # fmt: skip
 CONSTANTS: dict[str, tuple[str, ...]] = {
     "btf_decoder.glsl": ("VECTORS", "LATENT_VECTORS"),
@@ -83,6 +90,8 @@ CONSTANTS: dict[str, tuple[str, ...]] = {
     "lit_lobes.glsl": ("LEAST_VIEW",),
     "ssdf_lookup.glsl": ("SIDE",),
     "lit_distances.glsl": ("LEAST_VIEW", "SIDE", "LIGHTS"),
+    "scratch_table.glsl": ("BINS", "LEANS", "LEAN_VALUES", "KEEPS", "INDEX"),
+    "triangle_tree.glsl": ("TREE_WIDTH",),
 }
 """Names in capitals of files of functions."""
 _LIT: dict[str, Any] = {"TEXTURED": False, "MATT_HALF": 1024.0, "EDGES_FETCHED": False}
@@ -141,6 +150,7 @@ STAGES: list[tuple[str, dict[str, Any]]] = [
     *(("fur_shell", _FUR_SHELL | {"COLUMNS": columns}) for columns in (True, False)),
     ("fur_laid", _FUR_LAID),
     ("scratched_glass", _GLASS),
+    ("scratched_glass", _GLASS | {"KEEPS": False, "LEANS": 1, "LEAN_VALUES": [0.0]}),
     ("scratched_glass", _GLASS | {"LAYERS": 1, "ANGLES": [0.5]}),
     ("lit", _LIT | {"LIGHTS": 5, "EDGES": 2, "GLOSS": False}),
     ("lit", _LIT | _GLOSSY),
@@ -337,23 +347,35 @@ def test_marked_loops_are_written_out(folder: Path) -> None:
 # ---- functions -------------------------------------------------------------------------------
 
 
-def evaluated(file: str, expression: str, given: NDArray[np.floating]) -> NDArray[np.float32]:
-    """A vec3 of GLSL for each row of (n, k), k <= 4, which it has under the name ``given``."""
+def evaluated(
+    file: str,
+    expression: str,
+    given: NDArray[np.floating],
+    *,
+    before: str = "",
+    pictures: dict[str, NDArray[np.float32]] | None = None,
+    **values: Any,
+) -> NDArray[np.float32]:
+    """A vec3 of GLSL for each row of (n, k), k <= 4, which it has under the name ``given``;
+    ``before``: statements; ``pictures`` of floats, row 0 at v = 0, and ``values`` of the file."""
     rows = np.zeros((1, len(given), 4), np.float32)
     rows[0, :, : given.shape[1]] = given
     shader = Shader(
         fragment={
-            "TCoord::Dec": f"//VTK::TCoord::Dec\n{shader_source(file)}",
+            "TCoord::Dec": f"//VTK::TCoord::Dec\n{shader_source(file, **values)}",
             "Color::Impl": "//VTK::Color::Impl\n"
             "  vec4 given = texelFetch(inputs, ivec2(gl_FragCoord.xy), 0);\n"
-            f"  diffuseColor = {expression};\n",
+            f"{before}  diffuseColor = {expression};\n",
         }
     )
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [len(given), 1.0, 1.0]
     square = surface(
         corners,
         [[0, 1, 2], [0, 2, 3]],
-        textures={"inputs": texture(rows, interpolate=False)},
+        textures={
+            name: texture(np.ascontiguousarray(picture[::-1]), interpolate=False)
+            for name, picture in {"inputs": rows, **(pictures or {})}.items()
+        },
         shader=shader,
         lit=False,
     )
@@ -430,3 +452,56 @@ def test_fan_and_the_views_beside_a_viewer() -> None:
         between = np.interp(position, stored, np.arange(len(stored)))
         np.testing.assert_allclose(views[:, 0] + views[:, 2], between, atol=1e-4)
         assert set(views[:, 1] - views[:, 0]) <= {0.0, 1.0}
+
+
+def test_fresnel() -> None:
+    """By the amplitudes' ratios of the two angles (Hecht, Optics, section 4.6)."""
+    ratio, cosine = np.meshgrid([1 / 1.5, 1.5, 1 / 1.8], np.linspace(0.01, 0.999, 60))
+    given = np.stack([cosine.ravel(), ratio.ravel()], axis=1)
+    found = evaluated("fresnel.glsl", "vec3(fresnel(given.x, given.y), 0.0)", given)
+    incoming, sine = np.arccos(given[:, 0]), np.sin(np.arccos(given[:, 0])) * given[:, 1]
+    total = sine >= 1.0
+    outgoing = np.arcsin(np.minimum(sine, 1.0))
+    across = np.sin(incoming - outgoing) / np.sin(incoming + outgoing)
+    along = np.tan(incoming - outgoing) / np.tan(incoming + outgoing)
+    expected = np.where(total, 1.0, (across**2 + along**2) / 2)
+    assert total.any()
+    np.testing.assert_allclose(found[:, 0], expected, atol=2e-5)
+    np.testing.assert_allclose(found[:, 1], np.where(total, 0.0, np.cos(outgoing)), atol=2e-4)
+
+
+def test_a_ray_meets_the_first_triangle_of_the_tree() -> None:
+    """All triangles asked one by one, by Cramer's rule."""
+    rng = np.random.default_rng(5)
+    places = (rng.normal(size=(90, 1, 3)) + 0.4 * rng.normal(size=(90, 3, 3))).astype(np.float32)
+    tree = triangle_tree(places, places)
+    rays = directions(600)
+    call = (
+        "  float distance;\n  vec2 place;\n  int met = firstTriangle("
+        "tree, corners, vec3(0.1, 0.2, 0.3), given.xyz, 1e-4, distance, place);\n"
+    )
+    found = evaluated(
+        "triangle_tree.glsl",
+        "vec3(met, distance, place.x)",
+        rays,
+        before=call,
+        pictures={"tree": tree.nodes, "corners": tree.corners},
+        TREE_WIDTH=TREE_WIDTH,
+    )
+    a, b, c = np.moveaxis(places[tree.order].astype(float), 1, 0)
+    sides = np.stack([b - a, c - a, np.zeros_like(a)], axis=-1)
+    matrices = np.broadcast_to(sides, (len(rays), *sides.shape)).copy()
+    matrices[..., 2] = -rays[:, None]
+    u, v, distance = np.moveaxis(
+        np.linalg.solve(matrices, ([0.1, 0.2, 0.3] - a)[None, ..., None])[..., 0], -1, 0
+    )
+    distance[(u < 0) | (v < 0) | (u + v > 1) | (distance < 1e-4)] = np.inf
+    first = np.argmin(distance, axis=1)
+    hit = np.isfinite(distance.min(axis=1))
+    assert 100 < hit.sum() < 590
+    same = found[:, 0] == np.where(hit, first, -1)
+    assert same.mean() > 0.99  # others pass within a rounding of an edge
+    both = same & hit
+    rows = np.arange(len(rays))[both], first[both]
+    np.testing.assert_allclose(found[both, 1], distance[rows], rtol=1e-4)
+    np.testing.assert_allclose(found[both, 2], u[rows], atol=1e-3)

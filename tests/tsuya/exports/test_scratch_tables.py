@@ -13,7 +13,7 @@ from storage.packages import Contents, Mesh, Package, Source, read_package, writ
 from storage.packages.glass_scratches import PACKAGE
 from tsuya.exports.scratch_tables import write_exr, write_npz
 
-BINS, SIDE = 32, 16
+BINS, SIDE, LEANS = 16, 16, 3
 
 
 def glass_values(layers: int = 3) -> dict[str, Any]:
@@ -29,8 +29,8 @@ def glass_values(layers: int = 3) -> dict[str, Any]:
     corners = np.arange(3, dtype=np.uint32).reshape(1, 3)
     picture = np.full((4, 4, 3), 9, np.uint8)
     return {
-        "table": halfs(BINS, BINS) * np.float16(3),
-        "leaning": floats(2, BINS) * np.float32(8),
+        "table": halfs(LEANS, 2 * BINS, 2 * BINS) * np.float16(3),
+        "leans": np.linspace(0, 1, LEANS, dtype=np.float32),
         "angles": floats(layers),
         "coverage": random.integers(0, 256, (layers, SIDE, SIDE, 1), np.uint8),
         "object": Mesh(floats(3, 3), corners, floats(3, 3), attributes={"FACING": floats(3, 3)}),
@@ -41,11 +41,16 @@ def glass_values(layers: int = 3) -> dict[str, Any]:
     }
 
 
+def glass_contents(values: dict[str, Any]) -> Contents:
+    """What a package of these values is written of."""
+    parameters: dict[str, Any] = dict.fromkeys(PACKAGE.parameters, 0.5)
+    parameters |= {"refractive_index": 1.5, "tile": 0.7, "keeps_lean": True}
+    return Contents("groove on vase", (Source("groove", "CC0"),), values, parameters)
+
+
 def glass_package(values: dict[str, Any]) -> Package:
     """A package of these values."""
-    parameters = dict.fromkeys(PACKAGE.parameters, 0.5) | {"refractive_index": 1.5, "tile": 0.7}
-    contents = Contents("groove on vase", (Source("groove", "CC0"),), values, parameters)
-    return read_package(write_package(PACKAGE, contents))
+    return read_package(write_package(PACKAGE, glass_contents(values)))
 
 
 @pytest.fixture(scope="module")
@@ -75,12 +80,11 @@ def test_exr_files_hold_the_tables_for_another_reader(
     notes = write_exr(package, tmp_path / "tables")
     assert "8 bits" in notes[0]
     names = sorted(each.name for each in (tmp_path / "tables").iterdir())
-    assert names == ["coverage.exr", "leaning.exr", "readme.txt", "scratch_table.exr"]
+    assert names == ["coverage.exr", "readme.txt", "scratch_table.exr"]
     (table,) = _read_exr(tmp_path / "tables" / "scratch_table.exr").values()
-    assert np.array_equal(table, values["table"])
-    leaning = _read_exr(tmp_path / "tables" / "leaning.exr")
-    assert np.array_equal(leaning["F0"][0], values["leaning"][0])
-    assert np.array_equal(leaning["gamma"][0], values["leaning"][1])
+    assert table.shape == (LEANS * 2 * BINS, 2 * BINS)
+    for n in range(LEANS):
+        assert np.array_equal(table[2 * BINS * n : 2 * BINS * (n + 1)], values["table"][n])
     coverage = _read_exr(tmp_path / "tables" / "coverage.exr")
     assert len(coverage) == 3
     for n in range(3):
@@ -102,6 +106,8 @@ def test_the_text_beside_says_what_they_are(package: Package, tmp_path: Path) ->
     assert text.startswith("groove on vase\n")
     assert "refractive index 1.5, roughness of the walls 0.5, side of a tile 0.7" in text
     assert f"{package.array('angles')[2]:.6f}" in text
+    assert "where it is: 0.000000, 0.500000, 1.000000\n" in text
+    assert "walls keep the lean: yes" in text
 
 
 @pytest.mark.reads_back("npz")
@@ -112,15 +118,17 @@ def test_npz_is_as_documented(package: Package, values: dict[str, Any], tmp_path
     with zipfile.ZipFile(tmp_path / "glass.npz") as archive:
         for name in archive.namelist():
             found[name.removesuffix(".npy")] = _npy(archive.read(name))
-    for name in ("table", "leaning", "angles"):
+    for name in ("table", "leans", "angles"):
         assert found[name].dtype == values[name].dtype
         assert np.array_equal(found[name], values[name])
     assert np.allclose(found["coverage"], values["coverage"][..., 0] / 255, atol=1e-7)
     assert found["refractive_index"] == 1.5
+    assert found["keeps_lean"] == 1.0
     assert sorted(found) == [
         "angles",
         "coverage",
-        "leaning",
+        "keeps_lean",
+        "leans",
         "refractive_index",
         "roughness",
         "table",

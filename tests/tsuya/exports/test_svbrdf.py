@@ -11,6 +11,8 @@ import pytest
 from PIL import Image
 
 from assets_defs.neural_btf.package import packed_numbers, packed_parameters
+from pipelines.glass_scratches.tables.glass_table import glass_table
+from pipelines.glass_scratches.tables.profiles import built_in_profile
 from pipelines.light.directions import all_pairs, hemisphere_table, unit_vectors
 from pipelines.neural_btf.decoder_arrays import direction_inputs
 from pipelines.neural_btf.svbrdf_fit import svbrdf_errors
@@ -36,9 +38,9 @@ class Stand:
             "figures": [{"name": "RMSE over alpha", "value": 0.0123}],
         }
         file = BtfFile(btf.decoder, btf.latents, 6, 8, btf.alpha, parallax=btf.parallax)
-        self.values = packed_numbers(file)
+        self.values = packed_numbers(file) | {"table": np.ones((1, 32, 32), np.float16)}
         self.parameters = packed_parameters(file) | {
-            "tiles": 2.0, "roughness": 0.5, "refractive_index": 1.4,
+            "tiles": 2.0, "refractive_index": 1.4,
         }  # fmt: skip
         x, y = (axis.ravel() for axis in np.meshgrid(corner, corner))
         flat = np.stack([x, y, 0.1 * x * y], axis=1).astype(np.float32)
@@ -190,7 +192,16 @@ def test_materialx_of_glass_is_rough_where_scratches_are(tmp_path: Path) -> None
     assert surface.getInputValue("specular_IOR") == pytest.approx(1.4)
     assert surface.getInputValue("transmission") == 1.0
     rough = surface.getConnectedNode("specular_roughness")
-    assert rough.getInputValue("in2") == pytest.approx(0.5)
+    assert rough.getInputValue("in2") == pytest.approx(1.0)  # the stand-in's table is even
     codes = np.asarray(Image.open(tmp_path / "coverage.png"))
     one, two = package().textures("coverage")[..., 0] / 255
     assert np.abs(codes[::-1] / 255 - (1 - (1 - one) * (1 - two))).max() <= 0.5 / 255 + 1e-9
+
+
+@pytest.mark.parametrize("depth", [1.0, 2.0])
+def test_roughness_is_that_of_the_walls_slopes(depth: float) -> None:
+    """Clear walls of a shallow groove: its slope is alpha, the roughness squared."""
+    groove = built_in_profile("v", 10.0, depth)
+    table = glass_table(groove, bins=64, index=1.5, roughness=0.0, rays=500)
+    found = materialx.scratch_roughness(table.rho[0], 1.5)
+    assert found == pytest.approx((depth / 5.0) ** 0.5, rel=0.04)

@@ -40,12 +40,12 @@ SCENE = """\
 
 def write_scratches(package: Package, target: Path) -> Notes:
     """The plug-in's folder of a `glass_scratches` package. Raises BadInput."""
-    arrays = {name: package.array(name) for name in ("table", "leaning", "angles")}
+    arrays = {name: package.array(name) for name in ("table", "leans", "angles")}
     arrays["coverage"] = package.textures("coverage")[..., 0]
     arrays |= {
         name: np.array(package.parameter(parameter), np.float64)
         for name, parameter in (
-            ("index", "refractive_index"), ("roughness", "roughness"), ("tile", "tile"),
+            ("index", "refractive_index"), ("keeps", "keeps_lean"), ("tile", "tile"),
         )
     }  # fmt: skip
     bits = package.picture(f"environment_{package.parameter('environment')}")

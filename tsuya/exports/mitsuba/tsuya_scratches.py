@@ -7,11 +7,11 @@
 
 For closed solids. Tiles of scratches lie on the solid from the world's three axes (of ``si.p``: an
 object that is moved moves under its scratches). Where there is none, the glass is a smooth
-dielectric. Where there is one, a share F of the light is reflected by the table of the scratch,
-f = 2 / pi² rho(view, light) k F; the rest goes through: evenly for the rough share of the walls,
-bent as by the smooth surface for the mirror-like share. From inside, rough walls let
-(1 - F) / n² out and scatter the rest back, so the glass is reciprocal and as bright as a white
-furnace around it.
+dielectric. Where there is one, light goes by the table of its BSDF, of both sides: a view in bin o
+gets the part rho[o, i] w[i] r[i] / pi of radiance over n² from bin i, w the difference of the sines
+of the bin's ends, r the étendue of its side over that outside. Bins are of the angle across the
+scratch, outside, then inside the glass. A table is made for a lean: a direction's component along
+the scratch times the index where it is. Walls keep it, or forget it and spread étendue evenly.
 
 Left out of what Tsuya's own path tracer does: coverage is that of the map's nearest texel, so close
 up scratches are as sharp as the map and not as the features themselves; how light varies across a
@@ -28,8 +28,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-_LEAST_REFLECTED = 0.25
-"""Of a scratch's samples, from outside: its reflection is what lights are seen in."""
+_BLUR = 0.01
+"""Deviation of the lean where walls keep it: lobes of half a degree can still be evaluated."""
 
 
 class Lobe(NamedTuple):
@@ -46,20 +46,29 @@ class Scratches:
     def __init__(self, filename: str) -> None:
         with np.load(filename) as arrays:
             self.table = arrays["table"].astype(np.float64)
-            self.head_on, self.gamma = arrays["leaning"].astype(np.float64)
+            self.leans = [float(lean) for lean in arrays["leans"]]
+            self.keeps = bool(arrays["keeps"])
             self.angles = [float(angle) for angle in arrays["angles"]]
             self.coverage = arrays["coverage"].astype(np.float32) / 255.0
-            self.index, self.roughness = float(arrays["index"]), float(arrays["roughness"])
-            self.tile = float(arrays["tile"])
-        self.bins = len(self.table)
+            self.index, self.tile = float(arrays["index"]), float(arrays["tile"])
+        self.bins = self.table.shape[-1] // 2
         self.sines = np.sin(np.linspace(-np.pi / 2, np.pi / 2, self.bins + 1))
-        part = self.table * np.diff(self.sines) / np.pi
-        self.shares = part.sum(axis=1)
-        self.summed = part.cumsum(axis=1) / np.maximum(self.shares, 1e-30)[:, None]
-        bounce = self.roughness / (1.0 - self.roughness) if self.roughness < 1.0 else math.inf
-        self.blur = max(bounce / 2.0, 0.01)
-        self.mean_fresnel = self._mean_fresnel()
-        self.kept = 1.0 - (1.0 - self.mean_fresnel) / self.index**2
+        part = self.table * self._weights()[:, None]
+        shares = part.sum(axis=-1, keepdims=True)
+        self.parts = part
+        self.chances = part / np.where(shares > 0.0, shares, 1.0)
+        self.summed = self.chances.cumsum(axis=-1)
+
+    def _weights(self) -> Any:
+        """w r / pi of the bins of both sides (S, 2 M), for each lean."""
+        rows = []
+        for lean in self.leans:
+            ratio = self.index**2
+            if self.keeps:
+                ratio = math.sqrt((ratio - lean**2) / (1.0 - lean**2)) if lean < 1.0 else 1.0
+            weight = np.diff(self.sines) / np.pi
+            rows.append(np.concatenate([weight, ratio * weight]))
+        return np.array(rows)
 
     def lobes(self, position: Any, face: Any, frame: Any) -> tuple[float, list[Lobe]]:
         """How likely there is no scratch at a point, and those that there may be."""
@@ -82,42 +91,85 @@ class Scratches:
                     found.append(Lobe(share * part * _first_of(others), *directions))
         return clear, found
 
-    def fresnel(self, lean: float, place: int) -> float:
-        """F of a view whose cosine with the scratch is ``lean``, in a bin."""
-        theta = abs(math.asin(min(max(lean, -1.0), 1.0)))
-        share = float((2.0 * theta / math.pi) ** self.gamma[place])
-        return share + (1.0 - share) * float(self.head_on[place])
-
-    def place(self, across: float, up: float) -> int:
-        """The bin of a direction's angle across the scratch."""
-        angle = math.atan2(across, max(up, 0.0))
-        return min(max(int((angle / math.pi + 0.5) * self.bins), 0), self.bins - 1)
-
-    def reflected(self, lobe: Lobe, view: Any, light: Any) -> float:
-        """f of the scratch without F, above the surface."""
-        rows = [self.place(_dot(way, lobe.across), way[2]) for way in (view, light)]
-        kernel = theta_kernel(
-            theta_quantile(_dot(view, lobe.along)),
-            theta_quantile(_dot(light, lobe.along)),
-            self.blur,
-        )
-        return 2.0 / math.pi**2 * float(self.table[rows[0], rows[1]]) * kernel
+    def scattered(self, lobe: Lobe, view: Any, light: Any) -> tuple[float, float]:
+        """Part of the light from there that the view gets, and the density of `drawn`, both per
+        steradian."""
+        row, column = self._bin(lobe, view), self._bin(lobe, light)
+        value = density = 0.0
+        for table, share in self._tables(self._lean(lobe, view)):
+            value += share * float(self.parts[table, row, column])
+            density += share * float(self.chances[table, row, column])
+        if density <= 0.0:
+            return 0.0, 0.0
+        spread = self._spread(lobe, view, light, column % self.bins)
+        return value * spread, density * spread
 
     def drawn(self, lobe: Lobe, view: Any, numbers: tuple[float, float, float]) -> Any:
-        """A light above the surface; its density is f cos / share, exactly."""
-        row = self.summed[self.place(_dot(view, lobe.across), view[2])]
-        low = min(int(np.searchsorted(row, numbers[0], side="right")), self.bins - 1)
-        before = float(row[low - 1]) if low else 0.0
-        inside = (numbers[0] - before) / max(float(row[low]) - before, 1e-30)
-        inside = min(max(inside, 0.0), 1.0)
-        sine = float(self.sines[low] + inside * (self.sines[low + 1] - self.sines[low]))
-        lean = self._drawn_lean(_dot(view, lobe.along), numbers[1], numbers[2])
-        rest = math.sqrt(max(1.0 - lean * lean, 0.0))
-        parts = (lean, rest * sine, rest * math.sqrt(max(1.0 - sine * sine, 0.0)))
-        return tuple(
-            parts[0] * lobe.along[k] + parts[1] * lobe.across[k] + parts[2] * (k == 2)
-            for k in range(3)
-        )
+        """A light; None where the view gets none."""
+        pick, u, v = numbers
+        (table, first), *others = self._tables(self._lean(lobe, view))
+        if others and pick >= first:
+            pick, first, table = pick - first, 1.0 - first, others[0][0]
+        pick /= first
+        row = self.summed[table, self._bin(lobe, view)]
+        if row[-1] <= 0.0:
+            return None
+        found = min(int(np.searchsorted(row, pick, side="right")), len(row) - 1)
+        before = float(row[found - 1]) if found else 0.0
+        inside = (pick - before) / max(float(row[found]) - before, 1e-30)
+        ends = self.sines[found % self.bins : found % self.bins + 2]
+        sine = float(ends[0] + min(max(inside, 0.0), 1.0) * (ends[1] - ends[0]))
+        side = 1.0 if found < self.bins else self.index
+        along = self._drawn_lean(-self._lean(lobe, view), side, u, v) / side
+        rest = math.sqrt(max(1.0 - along * along, 0.0))
+        up = rest * math.sqrt(max(1.0 - sine * sine, 0.0))
+        x, y, _ = (along * lobe.along[k] + rest * sine * lobe.across[k] for k in range(3))
+        return x, y, up if found < self.bins else -up
+
+    def _lean(self, lobe: Lobe, way: Any) -> float:
+        return _dot(way, lobe.along) * (1.0 if way[2] > 0.0 else self.index)
+
+    def _bin(self, lobe: Lobe, way: Any) -> int:
+        angle = math.atan2(_dot(way, lobe.across), abs(way[2]))
+        found = min(max(int((angle / math.pi + 0.5) * self.bins), 0), self.bins - 1)
+        return found if way[2] > 0.0 else self.bins + found
+
+    def _tables(self, lean: float) -> list[tuple[int, float]]:
+        """Numbers of the tables next to a lean, and the share of each."""
+        lean, last = abs(lean), len(self.leans) - 1
+        if self.keeps and lean < 1.0:
+            last -= 1  # there is nothing between the last lean below 1 and 1
+        if lean >= self.leans[last]:
+            return [(last, 1.0)]
+        high = next(n for n, above in enumerate(self.leans) if above > lean)
+        share = (lean - self.leans[high - 1]) / (self.leans[high] - self.leans[high - 1])
+        return [(high - 1, 1.0 - share), (high, share)]
+
+    def _spread(self, lobe: Lobe, view: Any, light: Any, place: int) -> float:
+        """What turns a part of a bin into a density per steradian."""
+        side = 1.0 if light[2] > 0.0 else self.index
+        lean = self._lean(lobe, light)
+        if self.keeps:
+            mirrored = -self._lean(lobe, view)
+            images = (lean, 2.0 * side - lean, -2.0 * side - lean)
+            total = sum(math.exp(-0.5 * ((image - mirrored) / _BLUR) ** 2) for image in images)
+            density = total / (_BLUR * math.sqrt(2.0 * math.pi))
+        else:
+            density = 2.0 * math.sqrt(max(side**2 - lean**2, 0.0)) / (math.pi * side**2)
+        rest = math.sqrt(max(1.0 - (lean / side) ** 2, 1e-12))
+        width = float(self.sines[place + 1] - self.sines[place])
+        return density * side * abs(float(light[2])) / (rest * width)
+
+    def _drawn_lean(self, mirrored: float, side: float, u: float, v: float) -> float:
+        if not self.keeps:
+            return side * math.sqrt(u) * math.cos(2.0 * math.pi * v)  # the semicircle's law
+        normal = math.sqrt(-2.0 * math.log(1.0 - u)) * math.cos(2.0 * math.pi * v)
+        lean = mirrored + _BLUR * normal
+        if lean > side:
+            lean = 2.0 * side - lean
+        if lean < -side:
+            lean = -2.0 * side - lean
+        return min(max(lean, -side), side)
 
     def _covered(self, position: Any, face: Any, axis: int) -> list[float]:
         facing = 1.0 if face[axis] > 0.0 else 0.0
@@ -127,20 +179,6 @@ class Scratches:
         column = min(int((x - math.floor(x)) * size), size - 1)
         row = min(int((y - math.floor(y)) * size), size - 1)
         return [float(part) for part in self.coverage[:, row, column]]
-
-    def _drawn_lean(self, view_lean: float, u: float, v: float) -> float:
-        if math.isinf(self.blur):
-            return math.sqrt(u) * math.cos(2.0 * math.pi * v)
-        normal = math.sqrt(-2.0 * math.log(1.0 - u)) * math.cos(2.0 * math.pi * v)
-        c = (1.0 - theta_quantile(view_lean) + self.blur * normal) % 2.0
-        return sine_of_quantile(2.0 - c if c > 1.0 else c)
-
-    def _mean_fresnel(self) -> float:
-        theta = (np.arange(512) + 0.5) / 512 * np.pi / 2
-        weight = np.cos(theta) ** 2 / np.sum(np.cos(theta) ** 2)
-        share = (2.0 * theta[:, None] / np.pi) ** self.gamma
-        factor = share + (1.0 - share) * self.head_on
-        return float(weight @ factor @ np.diff(self.sines) / 2)
 
 
 def _first_of(others: list[float]) -> float:
@@ -169,44 +207,6 @@ def _directions(angle: float, axis: int, frame: Any) -> Any:
 
 def _dot(one: Any, other: Any) -> float:
     return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
-
-
-def theta_quantile(sine: float) -> float:
-    """Share of cos² theta below the theta of a sine."""
-    s = min(max(sine, -1.0), 1.0)
-    return 0.5 + (math.asin(s) + s * math.sqrt(1.0 - s * s)) / math.pi
-
-
-def sine_of_quantile(c: float) -> float:
-    """The sine whose quantile is c, by bisection."""
-    low, high = -math.pi / 2, math.pi / 2
-    for _ in range(48):
-        theta = (low + high) / 2
-        if theta + math.sin(theta) * math.cos(theta) > math.pi * (c - 0.5):
-            high = theta
-        else:
-            low = theta
-    return math.sin((low + high) / 2)
-
-
-def theta_kernel(c_view: float, c_light: float, blur: float) -> float:
-    """k: the density of the light's quantile for the view's, a Gaussian folded at 0 and 1."""
-    if math.isinf(blur):
-        return 1.0
-    if blur > 0.4:  # by cosines: images would never end
-        waves = (
-            math.exp(-0.5 * (math.pi * k * blur) ** 2)
-            * math.cos(math.pi * k * (1.0 - c_view))
-            * math.cos(math.pi * k * c_light)
-            for k in range(1, 12)
-        )
-        return 1.0 + 2.0 * sum(waves)
-    images = (
-        math.exp(-0.5 * ((sign * c_light + 2.0 * fold - 1.0 + c_view) / blur) ** 2)
-        for fold in range(-2, 3)
-        for sign in (-1.0, 1.0)
-    )
-    return sum(images) / (blur * math.sqrt(2.0 * math.pi))
 
 
 class _Way(NamedTuple):
@@ -299,38 +299,15 @@ class TsuyaScratches(mi.BSDF):
             self._last = (key, last)
         return last
 
-    def _reflected_chance(self, lobe: Lobe, view: Any) -> tuple[float, float, float]:
-        """From outside: F, the share that the table gives back, the chance to be sampled."""
-        glass = self.glass
-        place = glass.place(_dot(view, lobe.across), view[2])
-        fresnel = glass.fresnel(_dot(view, lobe.along), place)
-        share = float(glass.shares[place])
-        returned = fresnel * share
-        return fresnel, share, max(returned / (returned + 1.0 - fresnel), _LEAST_REFLECTED)
-
     def _value(self, lobes: list[Lobe], view: Any, light: Any) -> tuple[float, float]:
         """f cos(theta) and its density."""
-        glass, value, density = self.glass, 0.0, 0.0
-        even, above = abs(light[2]) / math.pi, light[2] > 0.0
+        value = density = 0.0
         for lobe in lobes:
-            if view[2] > 0.0:
-                fresnel, share, chance = self._reflected_chance(lobe, view)
-                if above:
-                    f = glass.reflected(lobe, view, light) * light[2]
-                    value += lobe.weight * fresnel * f
-                    density += lobe.weight * chance * f / share if share > 0.0 else 0.0
-                else:
-                    rough = lobe.weight * glass.roughness * even
-                    value += rough * (1.0 - fresnel) / glass.index**2
-                    density += rough * (1.0 - chance)
-            else:
-                rough = lobe.weight * glass.roughness * even
-                density += 0.5 * rough
-                if above:
-                    place = glass.place(_dot(light, lobe.across), light[2])
-                    value += rough * (1.0 - glass.fresnel(_dot(light, lobe.along), place))
-                else:
-                    value += rough * glass.kept
+            part, chance = self.glass.scattered(lobe, view, light)
+            value += lobe.weight * part
+            density += lobe.weight * chance
+        if view[2] * light[2] < 0.0:  # the table has radiance over n²
+            value *= self.glass.index ** (2.0 if view[2] < 0.0 else -2.0)
         return value, density
 
     def _drawn(
@@ -346,9 +323,7 @@ class TsuyaScratches(mi.BSDF):
         else:
             return _Way(None)
         pick = min(max(pick / lobe.weight, 0.0), 1.0 - 1e-7)
-        if view[2] > 0.0:
-            return self._from_outside(lobe, view, pick, point)
-        return self._from_inside(lobe, view, pick, point)
+        return _Way(self.glass.drawn(lobe, view, (pick, *point)))
 
     def _smooth(self, clear: float, view: Any, pick: float) -> _Way:
         reflectance = mi.fresnel(view[2], self.glass.index)[0]
@@ -364,37 +339,8 @@ class TsuyaScratches(mi.BSDF):
         z2 = 1.0 - x * x - y * y
         return (x, y, -math.copysign(math.sqrt(z2), view[2])) if z2 > 0.0 else None
 
-    def _from_outside(self, lobe: Lobe, view: Any, pick: float, point: tuple[float, float]) -> _Way:
-        fresnel, _, chance = self._reflected_chance(lobe, view)
-        if pick < chance:
-            return _Way(self.glass.drawn(lobe, view, (pick / chance, *point)))
-        if (pick - chance) / (1.0 - chance) < self.glass.roughness:
-            return _Way(_by_cosine(point, -1.0))
-        clear = lobe.weight * (1.0 - self.glass.roughness)
-        return _Way(self._bent(view), clear * (1.0 - fresnel), clear * (1.0 - chance))
-
-    def _from_inside(self, lobe: Lobe, view: Any, pick: float, point: tuple[float, float]) -> _Way:
-        glass = self.glass
-        if pick < glass.roughness:
-            return _Way(_by_cosine(point, 1.0 if pick < 0.5 * glass.roughness else -1.0))
-        clear = lobe.weight * (1.0 - glass.roughness)
-        out, passes = self._bent(view), 0.0
-        if out is not None:
-            place = glass.place(_dot(out, lobe.across), out[2])
-            passes = 1.0 - glass.fresnel(_dot(out, lobe.along), place)
-        if (pick - glass.roughness) / (1.0 - glass.roughness) < passes:
-            return _Way(out, clear * passes, clear * passes)
-        reflected = clear * (1.0 - passes)
-        return _Way((-view[0], -view[1], view[2]), reflected, reflected)
-
     def traverse(self, callback: Any) -> None:
         """Nothing can be differentiated."""
-
-
-def _by_cosine(point: tuple[float, float], side: float) -> tuple[float, float, float]:
-    radius, turn = math.sqrt(point[0]), 2.0 * math.pi * point[1]
-    up = side * math.sqrt(max(1.0 - point[0], 0.0))
-    return radius * math.cos(turn), radius * math.sin(turn), up
 
 
 mi.register_bsdf("tsuya_scratches", TsuyaScratches)

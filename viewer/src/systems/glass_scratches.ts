@@ -92,13 +92,14 @@ class ScratchedGlass implements LiveView {
     behind.lampRadiance.value.set(...radiance);
     const shown = surface.uniforms;
     shown.sky.value = this.environments.shown.texture;
+    shown.softSky.value = this.environments.shown.soft;
     shown.brightness.value = brightness;
     shown.toSky.value.copy(matrix(turned.clone().invert().multiply(surface.quaternion)));
     shown.lamp.value.set(...light).applyQuaternion(intoGlass);
     shown.lampRadiance.value.set(...radiance);
     shown.eye.value.copy(eyeOf(camera)).applyQuaternion(intoGlass);
     shown.tileSide.value = tile;
-    shown.through.value = brightness * this.environments.shown.through;
+    shown.allAround.value = brightness * this.environments.shown.through;
     shown.strength.value = strength;
     shown.coveredA.value.fromArray(this.covered(0));
     shown.coveredB.value.fromArray(this.covered(4));

@@ -3,13 +3,18 @@
 import * as THREE from "three";
 import { floatOf } from "./halfs";
 import { drawnLights, LIGHTS, luminance, meanLuminance, type Lights, type Radiance } from "./lights";
+import { softMap } from "./means";
 
 const LARGEST_HALF = 65504;
+/** Rows of the soft map, at most: about a bin of a table each. */
+const SOFT_ROWS = 64;
 
 /** Light from far away; all of it is multiplied by the exposure. */
 export class Environment {
   /** RGBA in halfs, row 0 at the nadir. */
   readonly texture: THREE.DataTexture;
+  /** The same with fewer rows, each texel a mean: what a bin of a table sees. */
+  readonly soft: THREE.DataTexture;
   /** Exposed. */
   readonly lights: Lights;
   /** Mean radiance all around, exposed: what comes through the glass. */
@@ -27,11 +32,13 @@ export class Environment {
     this.lights = { power: lights.power.map((power) => power * this.exposure), towards: lights.towards };
     this.through = this.lights.power.reduce((sum, power) => sum + power, 0) / (3 * 4 * Math.PI);
     this.texture = skyTexture(map, this.exposure);
+    this.soft = skyTexture(softMap(map, SOFT_ROWS), this.exposure);
   }
 
-  /** Frees its texture. */
+  /** Frees its textures. */
   dispose(): void {
     this.texture.dispose();
+    this.soft.dispose();
   }
 }
 

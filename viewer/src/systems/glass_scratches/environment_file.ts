@@ -3,6 +3,7 @@
 import { FloatType } from "three";
 import { HDRLoader } from "three/examples/jsm/loaders/HDRLoader.js";
 import type { Radiance } from "./lights";
+import { smaller } from "./means";
 
 /** Endings that are taken. */
 export const ENDINGS = ".hdr,.png,.jpg,.jpeg,.webp";
@@ -32,8 +33,7 @@ export function environmentOf({ width, height, data }: Colours, name: string): R
     throw new Error(`${name} is ${width} x ${height} pixels; expected an equirectangular picture, twice as wide as high.`);
   }
   const rows = Math.min(MOST_ROWS, height);
-  const narrow = averaged(light(data, 4), height, width, 2 * rows, 3);
-  const kept = averaged(narrow, 1, height, rows, 6 * rows);
+  const kept = smaller(light(data, 4), [height, width], [rows, 2 * rows]);
   if (!kept.some((value) => value > 0)) throw new Error(`${name} is all black; expected some light.`);
   return { height: rows, data: kept };
 }
@@ -45,25 +45,6 @@ function light(colours: ArrayLike<number>, channels: number): Float32Array {
     for (let channel = 0; channel < 3; channel++) {
       const value = colours[from + channel];
       kept[to + channel] = value > 0 && value < Infinity ? value : 0;
-    }
-  }
-  return kept;
-}
-
-/** Values (lines, from, size) averaged to (lines, to, size), to <= from, each over its share. */
-function averaged(values: Float32Array, lines: number, from: number, to: number, size: number): Float32Array {
-  if (from === to) return values;
-  const kept = new Float32Array(lines * to * size);
-  const step = from / to;
-  for (let line = 0; line < lines; line++) {
-    for (let n = 0; n < to; n++) {
-      const [start, end] = [n * step, Math.min((n + 1) * step, from)];
-      const into = (line * to + n) * size;
-      for (let i = Math.floor(start); i < end; i++) {
-        const share = (Math.min(end, i + 1) - Math.max(start, i)) / (end - start);
-        const out = (line * from + i) * size;
-        for (let value = 0; value < size; value++) kept[into + value] += share * values[out + value];
-      }
     }
   }
   return kept;

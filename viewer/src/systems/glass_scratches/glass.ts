@@ -2,15 +2,22 @@
 
 import * as THREE from "three";
 import { Surface } from "../../drawing/surface";
+import { BadPackage } from "../../package/bad_package";
 import type { Package, Values } from "../../package/package";
 import type { Layers } from "../../package/textures";
 import { float } from "../../shaders";
 import { HALF_OF_BYTE } from "./halfs";
 import { LIGHTS } from "./lights";
+import { TREE_WIDTH, triangleTree } from "./triangle_tree";
+
+const SCHEMA = 2;
 
 /** Layers of two textures of four channels. */
 const A_TEXTURE = 4;
-const ANISOTROPY = 4;
+/** Surfaces that a ray through a pixel is followed to. */
+const EVENTS = 8;
+/** Least distance to the next of them, in a solid of radius 1. */
+const NEAREST = 1e-4;
 /** The environment's lights and the lamp's. */
 const ALL_LIGHTS = LIGHTS + 1;
 
@@ -23,18 +30,20 @@ export interface Glass {
 
 /** Makes the glass of a package. Throws BadPackage. */
 export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Glass> {
-  const [mesh, coverage, table, leaning, angles] = await Promise.all([
+  if (pkg.meta.schema !== SCHEMA) {
+    throw new BadPackage(pkg.name, "schema", `${pkg.meta.schema}`, `${SCHEMA}: make the package again`);
+  }
+  const [mesh, coverage, table, leans, angles] = await Promise.all([
     pkg.mesh("object"),
     pkg.textures("coverage"),
     pkg.array("table"),
-    pkg.floats("leaning"),
+    pkg.floats("leans"),
     pkg.floats("angles"),
   ]);
-  const bins = pkg.shape("table")[0];
-  const index = pkg.parameter("refractive_index");
+  const [tables, views, columns] = pkg.shape("table");
   const lights = floats(new Float32Array(4 * 2 * ALL_LIGHTS), ALL_LIGHTS, 2);
-  lights.magFilter = lights.minFilter = THREE.NearestFilter;
   if (!mesh.normals) throw new Error(`${pkg.name}: object has no normals; expected those of shading.`);
+  const tree = triangleTree(...apart(mesh.triangles, mesh.vertices, mesh.normals));
   const surface = new Surface({
     vertices: mesh.vertices,
     triangles: mesh.triangles,
@@ -45,12 +54,18 @@ export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Gl
       LAYERS: angles.length,
       ANGLES: Array.from(angles),
       LIGHTS: ALL_LIGHTS,
-      RELATIVE_INDEX: float(1 / index),
-      BASE_REFLECTANCE: float(((index - 1) / (index + 1)) ** 2),
+      INDEX: float(pkg.parameter("refractive_index")),
+      BINS: columns / 2,
+      LEANS: tables,
+      LEAN_VALUES: Array.from(leans),
+      KEEPS: pkg.parameter<boolean>("keeps_lean"),
+      EVENTS,
+      NEAREST: float(NEAREST),
+      TREE_WIDTH,
       LAMP_EDGE: edge,
       EYE: "eye",
       TILE: "tileSide",
-      THROUGH: "through",
+      THROUGH: "allAround", // not `through`, which the shader has of its own
       TO_SKY: "toSky",
       LAMP: "lamp",
       LAMP_RADIANCE: "lampRadiance",
@@ -61,9 +76,11 @@ export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Gl
     },
     textures: {
       sky: new THREE.Texture(),
+      softSky: new THREE.Texture(),
       lights,
-      table: halfs(table as Uint16Array, bins, bins, THREE.RedFormat),
-      leaning: leaningTexture(leaning, bins),
+      table: tableTexture(table as Uint16Array, columns, tables * views),
+      tree: treeTexture(tree.nodes),
+      corners: treeTexture(tree.corners),
       coverageA: coverageTexture(coverage, 0),
       coverageB: coverageTexture(coverage, A_TEXTURE),
     },
@@ -71,7 +88,7 @@ export async function glassOf(pkg: Package, edge: readonly number[]): Promise<Gl
       eye: { type: "vec3", value: new THREE.Vector3() },
       brightness: { type: "float", value: 1 },
       tileSide: { type: "float", value: 1 },
-      through: { type: "float", value: 0 },
+      allAround: { type: "float", value: 0 },
       toSky: { type: "mat3", value: new THREE.Matrix3() },
       lamp: { type: "vec3", value: new THREE.Vector3(0, 0, 1) },
       lampRadiance: { type: "vec3", value: new THREE.Vector3() },
@@ -96,17 +113,28 @@ function coverageTexture({ count, width, height, data }: Layers, first: number):
   const made = halfs(content, width, height, THREE.RGBAFormat);
   made.minFilter = THREE.LinearMipmapLinearFilter;
   made.generateMipmaps = true;
-  made.anisotropy = ANISOTROPY;
   return made;
 }
 
-function leaningTexture(rows: Float32Array, bins: number): THREE.DataTexture {
-  const content = new Uint16Array(2 * bins);
-  for (let bin = 0; bin < bins; bin++) {
-    content[2 * bin] = THREE.DataUtils.toHalfFloat(rows[bin]);
-    content[2 * bin + 1] = THREE.DataUtils.toHalfFloat(rows[bins + bin]);
-  }
-  return halfs(content, bins, 1, THREE.RGFormat);
+/** A row for each lean and view, a column for each light. */
+function tableTexture(table: Uint16Array, columns: number, rows: number): THREE.DataTexture {
+  const made = halfs(table, columns, rows, THREE.RedFormat);
+  made.wrapS = made.wrapT = THREE.ClampToEdgeWrapping;
+  return made;
+}
+
+function treeTexture(texels: Float32Array): THREE.DataTexture {
+  return floats(texels, TREE_WIDTH, texels.length / (4 * TREE_WIDTH));
+}
+
+/** Places and normals of the corners of each triangle for itself. */
+function apart(triangles: Uint32Array, ...each: Float32Array[]): [Float32Array, Float32Array] {
+  const [places, normals] = each.map((values) => {
+    const made = new Float32Array(3 * triangles.length);
+    triangles.forEach((vertex, n) => made.set(values.subarray(3 * vertex, 3 * vertex + 3), 3 * n));
+    return made;
+  });
+  return [places, normals];
 }
 
 function halfs(content: Uint16Array, width: number, height: number, format: THREE.PixelFormat): THREE.DataTexture {
@@ -120,6 +148,7 @@ function halfs(content: Uint16Array, width: number, height: number, format: THRE
 
 function floats(content: Values, width: number, height: number): THREE.DataTexture {
   const made = new THREE.DataTexture(content as Float32Array<ArrayBuffer>, width, height, THREE.RGBAFormat, THREE.FloatType);
+  made.magFilter = made.minFilter = THREE.NearestFilter;
   made.needsUpdate = true;
   return made;
 }
