@@ -199,7 +199,7 @@ SSDF_BASIS = Schema(
         ),
         "bytes_raw": Variable((), "int64", "byte", "The SSDFs in single precision"),
         "bytes_file": Variable((), "int64", "byte", "Of the compressed form on disk"),
-        "bytes_memory": Variable((), "int64", "byte", "In memory, any vertex in one read"),
+        "bytes_memory": Variable((), "int64", "byte", "Resident while it is drawn"),
         "rmse": Variable((), "float64", "rad", "Error in memory, weighted by solid angle"),
         "wrong_visibility": Variable(
             (), "float64", "1", "Share of the sky above each vertex whose sign of d is wrong"

@@ -62,7 +62,7 @@ def test_the_stored_file_decodes_to_the_matrix(good: Any) -> None:
     matrix = _open(good, "ssdf_matrix", SCENE)["distances"].values
     stored = _open(good, "ssdf_basis", SCENE)
     memory = pack(from_bytes(stored["file"].values.tobytes()))
-    assert memory.nbytes == stored["bytes_memory"]
+    assert decoder_of(stored).resident_bytes == stored["bytes_memory"]
     bases = cluster_bases(memory)
     rows = range(0, len(matrix), 97)
     found = np.stack([vertex_distances(memory, bases, row) for row in rows])
@@ -98,7 +98,7 @@ def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:
     house.launcher.launch(Request(SSDF, [SCENE], "test", paper))
     made = _open(house, "ssdf_basis", SCENE)
     assert made["vectors"].shape == (24 * 12, 1024)
-    assert made["bytes_memory"] == made["vectors"].nbytes + made["weights"].nbytes
+    assert made["bytes_memory"] == decoder_of(made).resident_bytes
     house.launcher.launch(Request(SSDF, [SCENE], "test", paper | {"contribution": 0.8}))
     by_contribution = _open(house, "ssdf_basis", SCENE)
     assert len(by_contribution["vectors"]) != 24 * 12
