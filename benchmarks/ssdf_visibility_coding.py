@@ -45,9 +45,9 @@ def encode_visibility(visible: NDArray[np.bool_], triangles: NDArray[np.integer]
     n = math.isqrt(visible.shape[1])
     bits = visible.reshape(-1, n, n).astype(np.uint8)
     references = _references(visible, triangles)
-    steps = (np.arange(len(bits))[:, None] - references).T
+    steps = (np.arange(len(bits))[:, None] - references).T.astype(np.int64)
     # A step that the vertex before has, too, is a 0.
-    steps = np.where(steps == np.roll(steps, 1, axis=1), 0, steps)
+    steps[:, 1:] = np.where(steps[:, 1:] == steps[:, :-1], 0, steps[:, 1:])
     contexts = np.repeat(np.arange(_REFERENCES), len(bits))
     before = coder.encode(steps.ravel(), contexts)
     room = np.empty(64 + bits.size, np.uint8)
@@ -109,9 +109,9 @@ def _pad(picture: Bits, padded: Bits) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _around(a: Bits, y: int, x: int) -> tuple[int, int, int]:
+def _around(a: Bits, y: int, x: int) -> tuple[np.int64, np.int64, np.int64]:
     """Nine bits, their sum, and their sum weighted 1 2 1, 2 4 2, 1 2 1."""
-    whole, count, soft, place = 0, 0, 0, 0
+    whole, count, soft, place = np.int64(0), np.int64(0), np.int64(0), 0
     for dy in range(-1, 2):
         for dx in range(-1, 2):
             bit = np.int64(a[y + dy, x + dx])
@@ -145,13 +145,31 @@ def _contexts_at(
         | np.int64(a[y + 1, x + 1]) << 2
         | np.int64(a[y + 1, x - 1]) << 3
     )
-    found[0] = near | more << 4 | nee << 8 | at_a << 9 | at_b << 10 | ahead << 11 | np.int64(b[y + 1, x]) << 15
+    found[0] = (
+        near
+        | more << 4
+        | nee << 8
+        | at_a << 9
+        | at_b << 10
+        | ahead << 11
+        | np.int64(b[y + 1, x]) << 15
+    )
     found[1] = seen[0, 0] | near << 9 | at_b << 13 | at_c << 14
     found[2] = seen[1, 0] | near << 9 | at_a << 13 | at_c << 14
     found[3] = seen[2, 0] | near << 9 | at_a << 13 | at_b << 14
     found[4] = (((soft_a >> 1) * 9 + (soft_b >> 1)) * 9 + (soft_c >> 1)) * 16 + near
-    unlike_a = w ^ a[y, x - 1] | (nw ^ a[y - 1, x - 1]) << 1 | (n ^ a[y - 1, x]) << 2 | (ne ^ a[y - 1, x + 1]) << 3
-    unlike_b = w ^ b[y, x - 1] | (nw ^ b[y - 1, x - 1]) << 1 | (n ^ b[y - 1, x]) << 2 | (ne ^ b[y - 1, x + 1]) << 3
+    unlike_a = (
+        w ^ a[y, x - 1]
+        | (nw ^ a[y - 1, x - 1]) << 1
+        | (n ^ a[y - 1, x]) << 2
+        | (ne ^ a[y - 1, x + 1]) << 3
+    )
+    unlike_b = (
+        w ^ b[y, x - 1]
+        | (nw ^ b[y - 1, x - 1]) << 1
+        | (n ^ b[y - 1, x]) << 2
+        | (ne ^ b[y - 1, x + 1]) << 3
+    )
     found[5] = unlike_a | soft_a << 4 | unlike_b << 9 | at_b << 13
     found[6] = soft_a + 17 * (soft_b + 17 * near)
     total = soft_a + soft_b + soft_c
@@ -193,8 +211,6 @@ def _run(
     if not writes:
         for _ in range(4):
             state[0] = (state[0] << 8) | coder._next(state, code)
-        state[2] = 0
-        state[4] = state[4]
     models = np.full((_MODELS, _CONTEXTS), 32768, np.int64)
     times = np.zeros((_MODELS, _CONTEXTS), np.int64)
     mixing = np.full((_SETS, _MODELS), 22938, np.int64)
@@ -237,7 +253,7 @@ def _run(
                     answers[i] = logit[models[i, contexts[i]] >> 4]
                     mixed += answers[i] * mixing[chosen, i]
                 p = chance[min(max(mixed >> 16, -2047), 2047) + 2047]
-                bit = _binary(state, code, writes, 65536 - p, np.int64(bits[v, y, x]))
+                bit = _binary(state, code, writes, 65536 - p, int(bits[v, y, x]))
                 error = ((bit << 12) - (p >> 4)) * _RATE
                 for i in range(_MODELS):
                     mixing[chosen, i] += (answers[i] * error + 8192) >> 14

@@ -13,6 +13,7 @@ import pytest
 import tsuya
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
+from assets_defs.ssdf_lighting.datasets import decoder_of
 from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines.geometry import shapes
 from pipelines.light import built_in_environments

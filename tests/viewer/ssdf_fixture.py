@@ -16,6 +16,7 @@ from assets_defs.workspace import CHECKOUT
 from pipelines.light.built_in_environments import sky
 from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
+from pipelines.ssdf_lighting.compression.resident import halved
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
@@ -53,6 +54,7 @@ def values(file: bytes) -> dict[str, Any]:
         "step": codes.step,
         "root_weight": root_weights(_SIDE**2).tolist(),
         "distances": decoder.distances(np.arange(0, _VERTICES, 9)).round(6).tolist(),
+        **_halved(),
         "sharpness": _SHARPNESS,
         "columns": _COLUMNS,
         "axes": np.stack([lobes.along, lobes.up], axis=-1)[:, _COLUMNS].tolist(),
@@ -62,6 +64,15 @@ def values(file: bytes) -> dict[str, Any]:
         "irradiance_error": fit_lights(
             environment, 6, least_sharpness=3.0, most_sharpness=300.0
         ).irradiance_error,
+    }
+
+
+def _halved() -> dict[str, Any]:
+    rows = np.random.default_rng(3).normal(size=(2, 256)).round(4).astype(np.float32)
+    return {
+        "halved_rows": rows.tolist(),
+        "halved_root_weight": root_weights(256).tolist(),
+        "halved": halved(rows).tolist(),
     }
 
 

@@ -1,10 +1,11 @@
 """What is resident while a scene is drawn: clusters' vectors at half the resolution, in few bits.
 
 Distances change smoothly, so half as many rows and columns of directions do, where the values there
-are those whose bilinear interpolation is nearest to the vectors (least squares over the sphere), not
-samples of them. A column of a cluster (its centre, then its vectors) is rounded to 16, 8 or 4 bits,
-the fewest that keep its error of d below `_ROUNDING`; a vertex's weights are 16 bits. `ResidentTables`
-holds nothing else, and nothing is unfolded to draw from it: `resident_along` reads the codes.
+are those whose bilinear interpolation is nearest to the vectors (least squares over the sphere),
+not samples of them. A column of a cluster (its centre, then its vectors) is rounded to 16, 8 or 4
+bits, the fewest that keep its error of d below `_ROUNDING`; a vertex's weights are 16 bits.
+`ResidentTables` holds nothing else, and nothing is unfolded to draw from it: `resident_along` reads
+the codes.
 """
 
 from __future__ import annotations
@@ -94,7 +95,12 @@ def resident_tables(compact: CompactCodes) -> ResidentTables:
         scales.append(made.scale)
         weights.append(made.weights.ravel())
         start[order[row : row + size]] = written + rank * np.arange(size)
-        first, read, row, written = first + rank, read + size * rank, row + size, written + size * rank
+        first, read, row, written = (
+            first + rank,
+            read + size * rank,
+            row + size,
+            written + size * rank,
+        )
     lengths = [[len(each) for each in part] for part in parts]
     return ResidentTables(
         *(np.concatenate(part) for part in parts),
@@ -125,7 +131,9 @@ def _columns(rows: Floats, weights: NDArray[np.float64]) -> _Columns:
     spread = np.append(1.0, np.sqrt((weights**2).mean(axis=0)) if len(weights) else weights[:0])
     # A step s is an error of s / sqrt(12), times the weight.
     error = reach * spread / math.sqrt(12.0)
-    most = np.select([error / _NIBBLE <= _ROUNDING, error / _BYTE <= _ROUNDING], [_NIBBLE, _BYTE], _WORD)
+    most = np.select(
+        [error / _NIBBLE <= _ROUNDING, error / _BYTE <= _ROUNDING], [_NIBBLE, _BYTE], _WORD
+    )
     most[0] = _WORD
     order = np.argsort(-most, kind="stable")
     step = (reach / most)[order]

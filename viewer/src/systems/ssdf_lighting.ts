@@ -132,7 +132,7 @@ class LitView implements LiveView {
     this.scene.add(...this.parts, this.backdrop);
     this.show(loaded.probe);
     this.whole = loaded.distances.then((tables) => {
-      this.distanceBytes = 2 * tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
+      this.distanceBytes = tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
       if (this.ended) return;
       this.edges.load(tables);
       context.requestDraw();
