@@ -70,9 +70,14 @@ def run(scale: str) -> dict[str, Any]:
         _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
         _timed(figures, "edges", lambda: edge_figures(stored))
         figures |= slit_figures()
+        from benchmarks.ssdf_page import page_figures
         from benchmarks.ssdf_pictures import picture_figures
+        from benchmarks.ssdf_relit import relit_judge
+        from benchmarks.ssdf_rivals import rival_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))
+        _timed(figures, "rivals", lambda: rival_figures(stored, relit_judge(stored), scale))
+        _timed(figures, "page", lambda: page_figures(stored))
     return figures
 
 

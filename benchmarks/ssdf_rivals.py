@@ -244,8 +244,9 @@ class _Rows:
         contexts = np.tile(np.arange(len(bands)), len(transfer))
 
         def coded(step: float) -> bytes:
-            steps = np.diff(np.rint(transfer / step).astype(np.int64), axis=0, prepend=0)
-            return encode(steps.ravel(), contexts)
+            codes = np.rint(transfer / step).astype(np.int64)
+            codes[1:] -= codes[:-1].copy()
+            return encode(codes.ravel(), contexts)
 
         low, high = 1e-4, 1.0
         for _ in range(16):

@@ -60,8 +60,8 @@ def decode_visibility(data: bytes) -> NDArray[np.bool_]:
     """The visibility (V, n²) of a code."""
     count, n, length = _HEADER.unpack_from(data)
     contexts = np.repeat(np.arange(_REFERENCES), count)
-    steps = coder.decode(data[_HEADER.size : _HEADER.size + length], contexts)
-    steps = steps.reshape(_REFERENCES, count).astype(np.int64)
+    told = coder.decode(data[_HEADER.size : _HEADER.size + length], contexts)
+    steps = told.reshape(_REFERENCES, count).astype(np.int64)
     for row in steps:
         for vertex in range(1, count):
             if row[vertex] == 0:

@@ -18,6 +18,7 @@ from pipelines.ssdf_lighting.compression.decoder_tables import (
 from pipelines.ssdf_lighting.compression.resident import ResidentTables, resident_tables
 
 Floats = NDArray[np.float32]
+DistancesAlong = Callable[[NDArray[np.integer], Floats], Floats]
 
 
 class Decoder:
@@ -85,11 +86,15 @@ class Decoder:
         """d (P, D) float32, radians, of vertices (P,) in all directions."""
         return decoded_rows(self.tables, vertices)
 
-    def distances_along(self, vertices: NDArray[np.integer], axes: Floats) -> Floats:
-        """d (P, L) float32, radians, of vertices (P,) along unit vectors (P, L, 3) float32."""
+    @property
+    def distances_along(self) -> DistancesAlong:
+        """Function of vertices (P,) and unit vectors (P, L, 3) float32: d (P, L) float32, radians.
+
+        It holds what is resident and nothing else: not this decoder, nor its file.
+        """
         from pipelines.ssdf_lighting.compression.lookup import decoded_along, resident_along
 
         kept = self.resident
         if isinstance(kept, ResidentTables):
-            return resident_along(kept, vertices, axes)
-        return decoded_along(kept, vertices, axes)
+            return functools.partial(resident_along, kept)
+        return functools.partial(decoded_along, kept)

@@ -81,7 +81,7 @@ def resident_tables(compact: CompactCodes) -> ResidentTables:
         shared = halved(shared)
     centres, vectors = cluster_vectors(compact)
     sizes, order = compact.sizes, compact.vertices_in_order
-    parts: list[list[NDArray[np.generic]]] = [[], [], []]
+    parts: list[list[NDArray[np.integer]]] = [[], [], []]
     counts, scales, weights = [], [], []
     start = np.empty(len(order), np.uint32)
     first, read, row, written = 0, 0, 0, 0
@@ -102,8 +102,11 @@ def resident_tables(compact: CompactCodes) -> ResidentTables:
             written + size * rank,
         )
     lengths = [[len(each) for each in part] for part in parts]
+    words, whole, nibbles = (np.concatenate(part) for part in parts)
     return ResidentTables(
-        *(np.concatenate(part) for part in parts),
+        words.astype(np.int16, copy=False),
+        whole.astype(np.int8, copy=False),
+        nibbles.astype(np.uint8, copy=False),
         np.stack([np.cumsum(each) - each for each in lengths], axis=1).astype(np.uint32),
         np.array(counts, np.uint16),
         np.concatenate(scales).astype(np.float32),
@@ -119,13 +122,13 @@ class _Columns(NamedTuple):
     """A cluster's: codes of 16, 8 and 4 bits, (places, columns) each; ``counts`` (3,); ``scale``
     (1 + m,), ``weights`` (vertices, m) in the order of the columns."""
 
-    codes: tuple[NDArray[np.int16], NDArray[np.int8], NDArray[np.uint8]]
+    codes: tuple[NDArray[np.integer], NDArray[np.integer], NDArray[np.integer]]
     counts: tuple[int, int, int]
     scale: NDArray[np.float64]
     weights: NDArray[np.int16]
 
 
-def _columns(rows: Floats, weights: NDArray[np.float64]) -> _Columns:
+def _columns(rows: Floats, weights: NDArray[np.floating]) -> _Columns:
     """Round the centre and the vectors, rows (1 + m, places), with weights (vertices, m)."""
     reach = np.maximum(np.abs(rows).max(axis=1), 1e-30)
     spread = np.append(1.0, np.sqrt((weights**2).mean(axis=0)) if len(weights) else weights[:0])

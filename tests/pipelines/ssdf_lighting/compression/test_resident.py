@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -82,16 +86,24 @@ def test_a_lookup_interpolates_the_columns(file: bytes) -> None:
 
 def test_nothing_else_is_held_while_drawing(file: bytes) -> None:
     decoder = Decoder.of_file(file)
-    decoder.distances_along(np.arange(9), np.ones((9, 4, 3), np.float32))
-    held = {name: value for name, value in vars(decoder).items() if not callable(value)}
-    assert set(held) == {"resident"}
-    arrays = [part for part in held["resident"] if isinstance(part, np.ndarray)]
-    assert all(part.base is None or part.base.nbytes <= part.nbytes for part in arrays)
-    assert decoder.resident_bytes == sum(part.nbytes for part in arrays)
-    # A null: whole rows take the unfolded tables, which are more.
-    decoder.distances(np.arange(9))
-    assert "tables" in vars(decoder)
-    assert decoder.tables.table.nbytes > 1.5 * decoder.resident_bytes
+    stated, gone = decoder.resident_bytes, weakref.ref(decoder)
+    along = decoder.distances_along
+    assert "tables" not in vars(decoder)
+    del decoder
+    gc.collect()
+    assert gone() is None  # and its file with it
+    along(np.arange(9), np.ones((9, 4, 3), np.float32))
+    assert isinstance(along, functools.partial)
+    assert not along.keywords
+    (held,) = along.args
+    arrays = [part for part in held if isinstance(part, np.ndarray)]
+    assert {type(part) for part in held if not isinstance(part, np.ndarray)} == {int}
+    # Bytes of the memory behind them, not of a view on more.
+    memory = [part if part.base is None else part.base for part in arrays]
+    assert sum(whole.nbytes for whole in memory) == stated
+    # A null: unfolded to floats they are more.
+    tables = Decoder.of_file(file).tables
+    assert tables.table.nbytes + tables.weights.nbytes > 1.5 * stated
 
 
 def test_odd_numbers_of_narrow_columns_are_padded_by_nothing() -> None:
