@@ -48,8 +48,8 @@ _FINE = 3
 """Rays a side of a texel for the truth."""
 _SHARPNESS = (3.0, 10.0, 30.0, 100.0, 300.0)
 _AXES = 6
-_RMSE = (0.0045, 0.008, 0.013, 0.02, 0.03)
-"""Errors of ours that are tried."""
+_STEPS = (0.05, 0.1, 0.16, 0.25, 0.4)
+"""Steps of ours that are tried."""
 _DEGREES = 10
 """Bands of spherical harmonics: 100 coefficients a vertex."""
 
@@ -326,13 +326,21 @@ def _open_sky(vertices: NDArray[np.int64], axes: NDArray[np.float32]) -> NDArray
 
 def _at_equal_error(rows: _Rows, table: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Bytes of the bits over ours, at the coarsest of ours whose irradiance is not worse."""
+    cluster = rows.cluster.astype(np.int32)
+    factors = coding.cluster_factors(rows.basis, cluster)
+    count = rows.basis.coordinates.shape[0] * rows.basis.vectors.shape[0]
     tried = []
-    for rmse in _RMSE:
-        codes = coding.quantise_to_rmse(rows.basis, rows.cluster.astype(np.int32), rmse)
+    for step in _STEPS:
+        codes = coding.quantise(rows.basis, cluster, factors, step)
         file = to_bytes(codes)
-        error = irradiance_db(rows.judged, Decoder.of_file(file).distances_along)
-        tried.append({"rmse": rmse, "file_bytes": len(file), "irradiance_db": error})
-    found: dict[str, Any] = {"ours_by_rmse": tried}
+        tried.append(
+            {
+                "rmse": math.sqrt(coding.squared_error(rows.basis, codes) / count),
+                "file_bytes": len(file),
+                "irradiance_db": irradiance_db(rows.judged, Decoder.of_file(file).distances_along),
+            }
+        )
+    found: dict[str, Any] = {"ours_by_step": tried}
     for name, rival in (("", "bits_as_distances"), ("_summed", "bits")):
         fit = [row for row in tried if row["irradiance_db"] >= table[rival]["irradiance_db"]]
         ours = min((row["file_bytes"] for row in fit), default=None)

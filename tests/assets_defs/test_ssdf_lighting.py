@@ -18,7 +18,7 @@ from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines.geometry import shapes
 from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting import figures, scene
-from pipelines.ssdf_lighting.compression import compact, shared_basis, triangle_clusters
+from pipelines.ssdf_lighting.compression import compact, lookup, shared_basis, triangle_clusters
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes
 from pipelines.ssdf_lighting.compression.compact_memory import (
     cluster_bases,
@@ -240,9 +240,9 @@ def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
     return right(*arguments) + np.float32(0.03)
 
 
-def _stepping(right: Callable[..., Any], decoder: Any, vertices: Any, axes: Any) -> Any:
-    steps = (decoder.tables.cluster[vertices] % 2 * 0.05).astype(np.float32)
-    return right(decoder, vertices, axes) + steps[:, None]
+def _stepping(right: Callable[..., Any], tables: Any, vertices: Any, axes: Any) -> Any:
+    steps = (tables.cluster[vertices] % 2 * 0.05).astype(np.float32)
+    return right(tables, vertices, axes) + steps[:, None]
 
 
 def _uneven(right: Callable[..., Any], *arguments: Any) -> Any:
@@ -308,7 +308,7 @@ REGRESSIONS = (
     Regression("irradiance_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("share_from_above", built_in_environments, "sky", _upside_down, SKY),
-    Regression("relit_psnr", Decoder, "distances_along", _stepping, KEYS),
+    Regression("relit_psnr", lookup, "resident_along", _stepping, KEYS),
     Regression("reference_psnr", frames, "traced_reference", _wrong_lights, KEYS),
     Regression("colour_error", finishes, "_material_rows", _without_red, KEYS),
     Regression("coverage", viewpoints, "scene_camera", _far_camera, KEYS),
