@@ -168,7 +168,11 @@ SSDF_BASIS = Schema(
     "The compressed SSDFs: a file, or the paper's vectors and weights.",
     {
         "file": Variable(
-            ("byte",), "uint8", "1", "The compact form, entropy coded (docs/ssdf.md)", optional=True
+            ("byte",),
+            "uint8",
+            "1",
+            "The compact form, entropy coded (docs/ssdf_file.md)",
+            optional=True,
         ),
         "vectors": Variable(
             ("value", "direction"),
