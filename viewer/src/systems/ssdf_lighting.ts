@@ -140,7 +140,7 @@ class LitView implements LiveView {
     SOURCE.values.forEach((row, vertex) => (this.vertexOfRow[row] = vertex));
     this.show(loaded.probe);
     this.whole = loaded.distances.then((tables) => {
-      this.distanceBytes = 2 * tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
+      this.distanceBytes = tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
       if (this.ended) return;
       this.edges.load(tables);
       context.requestDraw();
