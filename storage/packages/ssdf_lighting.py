@@ -118,7 +118,7 @@ _BOUNCE: dict[str, Part] = {
 
 PACKAGE = PackageSchema(
     "ssdf_lighting",
-    1,
+    2,
     "A scene, its compressed spherical signed distance functions, and an environment.",
     {
         "mesh": MeshPart(
