@@ -74,12 +74,16 @@ def run(scale: str) -> dict[str, Any]:
         figures |= slit_figures()
         _timed(figures, "seams", lambda: seam_figures(stored))
         _timed(figures, "thin", thin_figures)
+        from benchmarks.ssdf_page import page_figures
         from benchmarks.ssdf_pictures import picture_figures
+        from benchmarks.ssdf_probe import probe_figures
+        from benchmarks.ssdf_relit import relit_judge
+        from benchmarks.ssdf_rivals import rival_figures
 
         _timed(figures, "pictures", lambda: picture_figures(stored))
-    from benchmarks.ssdf_probe import probe_figures
-
-    _timed(figures, "probe", probe_figures)
+        _timed(figures, "rivals", lambda: rival_figures(stored, relit_judge(stored), scale))
+        _timed(figures, "page", lambda: page_figures(stored))
+        _timed(figures, "probe", probe_figures)
     return figures
 
 
@@ -200,7 +204,7 @@ def _compact(
     found: dict[str, Any] = {
         "file_bytes": len(file),
         "memory_bytes": memory.nbytes,
-        "runtime_bytes": _resident_bytes(decoder),
+        "runtime_bytes": decoder.resident_bytes,
         "best_rmse_file": errors[0],
         "best_rmse_memory": errors[1],
         "best_rmse_ratio": max(errors) / target,
@@ -222,11 +226,6 @@ def _compact(
     codes = np.concatenate([part.ravel() for part in best[1:]]).astype("<i2").tobytes()
     found["file_bytes_lzma"] = len(lzma.compress(codes, preset=9))
     return found
-
-
-def _resident_bytes(decoder: Decoder) -> int:
-    """Of what is looked up while drawing: the clusters' vectors and the vertices' weights."""
-    return decoder.tables.table.nbytes + decoder.tables.weights.nbytes
 
 
 def _curve(
@@ -305,9 +304,10 @@ def _single(folder: Path, factors: tuple[int, ...]) -> dict[str, Any]:
         label = f"{factor}x"
         found["single_pca_file_ratio"][label] = len(to_bytes(one)) / len(to_bytes(own))
         found["single_pca_memory_ratio"][label] = pack(one).nbytes / pack(own).nbytes
-        found["single_pca_resident_ratio"][label] = _resident_bytes(
-            Decoder.of_file(to_bytes(one))
-        ) / _resident_bytes(Decoder.of_file(to_bytes(own)))
+        found["single_pca_resident_ratio"][label] = (
+            Decoder.of_file(to_bytes(one)).resident_bytes
+            / Decoder.of_file(to_bytes(own)).resident_bytes
+        )
         found["single_pca_multiplies_ratio"][label] = values[0] / values[1]
         found["single_pca_values"][label], found["clusters_values"][label] = values
     return found

@@ -79,8 +79,7 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     return {
         "pictures_rmse": float(basis["rmse"]),
         "pictures_file_bytes": int(basis["bytes_file"]),
-        "pictures_memory_bytes": int(basis["bytes_memory"]),
-        "pictures_resident_bytes": decoder.tables.table.nbytes + decoder.tables.weights.nbytes,
+        "resident_bytes": decoder.resident_bytes,
         "relight_fps": 1.0 / float(np.median(turn.seconds)),
         "relight_ms_slowest": 1000.0 * float(turn.seconds[1:].max()),
         "renderer": turn.renderer,

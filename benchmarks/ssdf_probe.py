@@ -27,12 +27,11 @@ from benchmarks.ssdf_probe_scenes import SCENES
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.picture_metrics import flip_map, psnr
 from pipelines.drawing.stage import Camera
-from pipelines.geometry.rays import build_scene
 from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting.compression.compact_file import compress
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.lookup import matrix_along
-from pipelines.ssdf_lighting.distances.refined import refined_distances
+from pipelines.ssdf_lighting.distances.refined import occluders, refined_distances
 from pipelines.ssdf_lighting.distances.visibility import (
     RayOrigins,
     SceneVisibility,
@@ -129,13 +128,13 @@ def _prepared(scene: Scene) -> Prepared:
 
 
 def _distances(scene: Scene, seen: SceneVisibility) -> NDArray[np.float32]:
-    rays = build_scene(scene.vertices, scene.triangles)
+    around = occluders(scene.vertices, scene.triangles)
     blocks = []
     for first in range(0, len(scene.vertices), 512):
         block = slice(first, first + 512)
         origins = RayOrigins(seen.origins.points[block], seen.origins.sealed[block])
         visible = unpacked(seen.visible[block], SIDE**2)
-        blocks.append(refined_distances(rays, origins, scene.normals[block], visible))
+        blocks.append(refined_distances(around, origins, scene.normals[block], visible))
     return np.concatenate(blocks)
 
 

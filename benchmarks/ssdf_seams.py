@@ -42,7 +42,7 @@ def seam_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """The ratio of the stored basis, of one PCA at the same borders, and of the null."""
     scene, basis = scene_of(stored("scene_mesh")), stored("ssdf_basis")
     matrix, decoder = stored("ssdf_matrix")["distances"].values, decoder_of(basis)
-    rmse, cluster = float(basis["rmse"]), decoder.tables.cluster
+    rmse, cluster = float(basis["rmse"]), decoder.resident.cluster
     shared = shared_basis_of(stored("triangle_clusters"))
     one = compact.quantise_to_rmse(shared, np.zeros(len(matrix), np.int32), rmse)
     offset = np.random.default_rng(0).normal(size=int(cluster.max()) + 1) * rmse
@@ -59,7 +59,7 @@ def seam_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
 
 
 def _offset(decoder: Decoder, offset: Floats, vertices: NDArray[np.int64], axes: Floats) -> Floats:
-    return decoder.distances_along(vertices, axes) + offset[decoder.tables.cluster[vertices], None]
+    return decoder.distances_along(vertices, axes) + offset[decoder.resident.cluster[vertices], None]
 
 
 def brightness(scene: Scene, distances_along: DistancesAlong) -> NDArray[np.float64]:

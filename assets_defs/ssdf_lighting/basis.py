@@ -123,7 +123,7 @@ def _seam_ratio(version: StoredVersion) -> float:
     decoder, blocks = decoder_of(version.dataset), distance_blocks(version.input("ssdf_matrix"))
     errors = figures.errors_along_axes(blocks, decoder.distances_along)
     triangles = version.input("scene_mesh")["triangles"].values
-    return figures.seam_ratio(errors, triangles, decoder.tables.cluster)
+    return figures.seam_ratio(errors, triangles, decoder.resident.cluster)
 
 
 def _basis_pictures(dataset: xr.Dataset) -> Pictures:
@@ -156,7 +156,7 @@ def _basis_pictures(dataset: xr.Dataset) -> Pictures:
         Check("rmse", "Error in memory, rad.", _rmse, at_most=0.1, change=0.001),
         Check(
             "byte_share",
-            "Bytes in memory over raw bytes.",
+            "Bytes resident while drawn over raw bytes.",
             _byte_share,
             at_most=0.5,
             change=0.002,
@@ -236,7 +236,7 @@ def _papers_form(
     )
     decoder = Decoder.of_pca(pca, len(matrix))
     shown = {"cumulative error": float(pca.relative_error.sum())}
-    return _Coded(pca_variables(pca), decoder, pca.nbytes, pca.nbytes, shown)
+    return _Coded(pca_variables(pca), decoder, pca.nbytes, decoder.resident_bytes, shown)
 
 
 def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Coded:
@@ -244,7 +244,6 @@ def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Co
 
     from pipelines.ssdf_lighting.compression import compact
     from pipelines.ssdf_lighting.compression.compact_file import to_bytes
-    from pipelines.ssdf_lighting.compression.compact_memory import pack
     from pipelines.ssdf_lighting.compression.decoder import Decoder
 
     # Cluster numbers of vertices without gaps: a cluster of triangles may have no vertex.
@@ -259,4 +258,4 @@ def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Co
     file = to_bytes(codes)
     shown = {"vectors": len(codes.level), "shared vectors": len(codes.shared)}
     decoder = Decoder.of_file(file)
-    return _Coded(file_variables(file), decoder, len(file), pack(codes).nbytes, shown)
+    return _Coded(file_variables(file), decoder, len(file), decoder.resident_bytes, shown)

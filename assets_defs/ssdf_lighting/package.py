@@ -324,7 +324,9 @@ def _figures(inputs: _Inputs, lineage: Sequence[Mapping[str, Any]]) -> list[Figu
         Figure("vertices with an SSDF", float(inputs.scene_mesh.sizes["vertex"])),
         Figure("raw SSDFs", float(basis["bytes_raw"]), "byte", None),
         Figure("compressed SSDFs, file", float(basis["bytes_file"]), "byte", paper),
-        Figure("compressed SSDFs, in memory", float(basis["bytes_memory"]), "byte", paper),
+        Figure(
+            "compressed SSDFs, resident while drawn", float(basis["bytes_memory"]), "byte", paper
+        ),
         Figure("error of the angle", float(basis["rmse"]), "rad"),
         Figure("share of the sky with wrong visibility", float(basis["wrong_visibility"])),
         Figure("relative error of irradiance", float(lights["irradiance_error"])),

@@ -10,7 +10,7 @@ order of the method:
    shaders.
 3. ``compression``: a basis of the scene (``shared_basis``), clusters (``triangle_clusters``), few
    bits in them (``compact``, ``compact_file``, ``compact_memory``) or the paper's vectors
-   (``clustered_pca``); ``decoder`` gives distances back.
+   (``clustered_pca``); ``resident`` is what stays while drawing, ``decoder`` gives distances back.
 4. ``light``: an environment as spherical Gaussians (``environment_fit``), and what the matt and the
    glossy part of a surface make of them (``cosine_lobes``, ``gloss_lobes``, ``shading``).
 5. ``drawing``: the scene under turning light on the stage, and traced (``frames``).

@@ -14,17 +14,12 @@ from storage.packages.schema import (
 _DECODING = """\
 Directions are unit vectors, z up. The scene's middle is the origin, its radius 1.
 
-**Distances.** `ssdf` is the file that `docs/ssdf.md` and the docstrings of
-`pipelines/ssdf_lighting/compression/compact_file.py` and `entropy_coding.py` lay out: step q,
-codes of R shared vectors (cosine transformed), of each cluster's centre and vectors in them, of
-each vertex's weights. With sigma = q 2^(level / 4) a shared vector is the inverse orthonormal
-two-dimensional cosine transform of q times its codes, divided by its sigma and by `root_weight`;
-a centre is q / sqrt(vertices of the cluster) times its codes, a cluster's vector q / sigma times
-its codes, a weight q times its code. d of a vertex of row `SOURCE` is the centre plus the
-weighted vectors, over n x n directions. (In memory the stage rounds shared vectors, before
-`root_weight`, to q / (2 sigma).) Without `ssdf` there are the paper's `vectors` and `weights`
-instead: row i of the weights belongs to vertex `row_vertex`[i]; rows `row_first`[c] to
-`row_first`[c + 1] are cluster c's, as many weights each as vectors between `first`[c] and
+**Distances.** `ssdf` is a file whose page is `docs/ssdf_file.md`: from it follow n x n directions,
+and d of each row `SOURCE` of the mesh in all of them; `root_weight` is the root that the page
+divides by. (Drawn are columns at half the resolution, rounded:
+`pipelines/ssdf_lighting/compression/resident.py`.) Without `ssdf` there are the paper's `vectors`
+and `weights` instead: row i of the weights belongs to vertex `row_vertex`[i]; rows `row_first`[c]
+to `row_first`[c + 1] are cluster c's, as many weights each as vectors between `first`[c] and
 `first`[c + 1]; a vertex takes its first row.
 
 Direction (x, y, z) lies at (x, y) / (|x| + |y| + |z|) of the square [-1, 1]², where z < 0 folded
@@ -123,7 +118,7 @@ _BOUNCE: dict[str, Part] = {
 
 PACKAGE = PackageSchema(
     "ssdf_lighting",
-    1,
+    2,
     "A scene, its compressed spherical signed distance functions, and an environment.",
     {
         "mesh": MeshPart(

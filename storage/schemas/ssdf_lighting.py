@@ -168,7 +168,11 @@ SSDF_BASIS = Schema(
     "The compressed SSDFs: a file, or the paper's vectors and weights.",
     {
         "file": Variable(
-            ("byte",), "uint8", "1", "The compact form, entropy coded (docs/ssdf.md)", optional=True
+            ("byte",),
+            "uint8",
+            "1",
+            "The compact form, entropy coded (docs/ssdf_file.md)",
+            optional=True,
         ),
         "vectors": Variable(
             ("value", "direction"),
@@ -199,7 +203,7 @@ SSDF_BASIS = Schema(
         ),
         "bytes_raw": Variable((), "int64", "byte", "The SSDFs in single precision"),
         "bytes_file": Variable((), "int64", "byte", "Of the compressed form on disk"),
-        "bytes_memory": Variable((), "int64", "byte", "In memory, any vertex in one read"),
+        "bytes_memory": Variable((), "int64", "byte", "Resident while it is drawn"),
         "rmse": Variable((), "float64", "rad", "Error in memory, weighted by solid angle"),
         "wrong_visibility": Variable(
             (), "float64", "1", "Share of the sky above each vertex whose sign of d is wrong"

@@ -13,11 +13,12 @@ import pytest
 import tsuya
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
+from assets_defs.ssdf_lighting.datasets import decoder_of
 from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines.geometry import shapes
 from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting import figures, scene
-from pipelines.ssdf_lighting.compression import compact, shared_basis, triangle_clusters
+from pipelines.ssdf_lighting.compression import compact, lookup, shared_basis, triangle_clusters
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes
 from pipelines.ssdf_lighting.compression.compact_memory import (
     cluster_bases,
@@ -68,7 +69,7 @@ def test_the_stored_file_decodes_to_the_matrix(good: Any) -> None:
     matrix = _open(good, "ssdf_matrix", SCENE)["distances"].values
     stored = _open(good, "ssdf_basis", SCENE)
     memory = pack(from_bytes(stored["file"].values.tobytes()))
-    assert memory.nbytes == stored["bytes_memory"]
+    assert decoder_of(stored).resident_bytes == stored["bytes_memory"]
     bases = cluster_bases(memory)
     rows = range(0, len(matrix), 97)
     found = np.stack([vertex_distances(memory, bases, row) for row in rows])
@@ -104,7 +105,7 @@ def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:
     house.launcher.launch(Request(SSDF, [SCENE], "test", paper))
     made = _open(house, "ssdf_basis", SCENE)
     assert made["vectors"].shape == (24 * 12, 1024)
-    assert made["bytes_memory"] == made["vectors"].nbytes + made["weights"].nbytes
+    assert made["bytes_memory"] == decoder_of(made).resident_bytes
     house.launcher.launch(Request(SSDF, [SCENE], "test", paper | {"contribution": 0.8}))
     by_contribution = _open(house, "ssdf_basis", SCENE)
     assert len(by_contribution["vectors"]) != 24 * 12
@@ -255,9 +256,9 @@ def _raised(right: Callable[..., Any], *arguments: Any) -> Any:
     return right(*arguments) + np.float32(0.03)
 
 
-def _stepping(right: Callable[..., Any], decoder: Any, vertices: Any, axes: Any) -> Any:
-    steps = (decoder.tables.cluster[vertices] % 2 * 0.05).astype(np.float32)
-    return right(decoder, vertices, axes) + steps[:, None]
+def _stepping(right: Callable[..., Any], tables: Any, vertices: Any, axes: Any) -> Any:
+    steps = (tables.cluster[vertices] % 2 * 0.05).astype(np.float32)
+    return right(tables, vertices, axes) + steps[:, None]
 
 
 def _uneven(right: Callable[..., Any], *arguments: Any) -> Any:
@@ -334,7 +335,7 @@ REGRESSIONS = (
     Regression("shadowed_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("tone_error", environment_fit, "fit_lights", _turned, SKY),
     Regression("share_from_above", built_in_environments, "sky", _upside_down, SKY),
-    Regression("relit_psnr", Decoder, "distances_along", _stepping, KEYS),
+    Regression("relit_psnr", lookup, "resident_along", _stepping, KEYS),
     Regression("probe_psnr", frames, "ProbeSource", _wrong_probe, KEYS),
     Regression("reflected_light", bounced_light, "bounced", _darkness, KEYS),
     Regression("colour_error", finishes, "_material_rows", _without_red, KEYS),

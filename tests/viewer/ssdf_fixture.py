@@ -17,6 +17,7 @@ from pipelines.light.built_in_environments import sky
 from pipelines.light.environment_maps import texel_directions
 from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
+from pipelines.ssdf_lighting.compression.resident import halved
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
@@ -57,6 +58,7 @@ def values(file: bytes) -> dict[str, Any]:
         "step": codes.step,
         "root_weight": root_weights(_SIDE**2).tolist(),
         "distances": decoder.distances(np.arange(0, _VERTICES, 9)).round(6).tolist(),
+        **_halved(),
         "sharpness": _SHARPNESS,
         "columns": _COLUMNS,
         "axes": np.stack([lobes.along, lobes.up], axis=-1)[:, _COLUMNS].tolist(),
@@ -99,6 +101,15 @@ def _bounce() -> dict[str, Any]:
     parts = {name: part.ravel().tolist() for name, part in factors._asdict().items()}
     found = bounced(factors, direct)
     return {**parts, "direct": direct.ravel().tolist(), "found": found.ravel().tolist()}
+
+
+def _halved() -> dict[str, Any]:
+    rows = np.random.default_rng(3).normal(size=(2, 256)).round(4).astype(np.float32)
+    return {
+        "halved_rows": rows.tolist(),
+        "halved_root_weight": root_weights(256).tolist(),
+        "halved": halved(rows).tolist(),
+    }
 
 
 def _digest(*arrays: Any) -> str:

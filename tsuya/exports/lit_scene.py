@@ -34,7 +34,7 @@ glsl/          lit_distances.glsl finds the distances of all lobes at a vertex, 
 def write_glb(package: Package, target: Path) -> Notes:
     """A folder: `scene.glb`, the distances, the lights, and the shaders that use them.
 
-    Raises BadInput for a package that is damaged.
+    Raises BadInput for a package that is damaged or of another schema.
     """
     import numpy as np
 
@@ -42,6 +42,7 @@ def write_glb(package: Package, target: Path) -> Notes:
     from tsuya.exports.lit_materials import scene_glb
     from tsuya.exports.lit_tables import decoder_tables, sky_shares
 
+    _check_schema(package)
     tables = decoder_tables(package)
     (target / "glsl").mkdir(parents=True)
     (target / "scene.glb").write_bytes(scene_glb(package, sky_shares(package, tables)))
@@ -105,7 +106,7 @@ def _with_included(folder: Path, names: tuple[str, ...]) -> list[str]:
 def write_usd(package: Package, target: Path) -> Notes:
     """A folder: `scene.usda` with its textures, and the environment as a dome light.
 
-    Raises BadInput for a package that is damaged.
+    Raises BadInput for a package that is damaged or of another schema.
     """
     import numpy as np
 
@@ -113,12 +114,22 @@ def write_usd(package: Package, target: Path) -> Notes:
     from tsuya.exports.lit_usd import scene_usda
     from tsuya.picture_files import write_picture
 
+    _check_schema(package)
     target.mkdir(parents=True)
     write_picture(package.array("environment").astype(np.float32), target / "environment", "exr")
     for name, picture in map_files(package).items():
         write_picture(picture, target / name.removesuffix(".png"), "png")
     (target / "scene.usda").write_text(scene_usda(package))
     return ("Shadows are the renderer's own: USD has no place for distances.",)
+
+
+def _check_schema(package: Package) -> None:
+    from storage.packages.ssdf_lighting import PACKAGE
+    from storage.readers.bad_input import BadInput
+
+    if package.meta["schema"] != PACKAGE.number:
+        expected = f"{PACKAGE.number}, as this Tsuya makes them: make the package again"
+        raise BadInput(package.name, "schema", f"{package.meta['schema']}", expected)
 
 
 FORMATS = (

@@ -8,6 +8,7 @@ import { readCompactFile } from "../src/systems/ssdf_lighting/compact_file";
 import { tablesOfCodes, tablesOfPaper, type DistanceTables } from "../src/systems/ssdf_lighting/distance_tables";
 import { fitLights, integral } from "../src/systems/ssdf_lighting/environment_fit";
 import { bounced } from "../src/systems/ssdf_lighting/interreflection";
+import { halved } from "../src/systems/ssdf_lighting/half_resolution";
 import { Matrix, nonnegative, solved } from "../src/systems/ssdf_lighting/least_squares";
 import { COLUMNS, FINE, mattTables, scaledBessel0, scaledBessel1 } from "../src/systems/ssdf_lighting/lobe_tables";
 import { readRadiance } from "../src/systems/ssdf_lighting/probe_files";
@@ -22,7 +23,7 @@ function distancesOf({ vectors, weights, sources, resolution }: DistanceTables, 
   const [start, width, first] = sources.subarray(4 * vertex, 4 * vertex + 3);
   return Array.from({ length: resolution ** 2 }, (_, direction) => {
     let sum = 0;
-    for (let k = 0; k < 4 * width; k++) sum += vectors[4 * (start + direction * width) + k] * weights[4 * first + k];
+    for (let k = 0; k < 4 * width; k++) sum += (vectors[4 * (start + direction * width) + k] / 255) * weights[4 * first + k];
     return sum;
   });
 }
@@ -43,7 +44,10 @@ describe("the compact file", () => {
     const tables = tablesOfCodes(readCompactFile(file), Float32Array.from(known.root_weight));
     known.distances.forEach((expected: number[], k: number) => {
       const found = distancesOf(tables, 9 * k);
-      found.forEach((value, direction) => expect(Math.abs(value - expected[direction])).toBeLessThan(2e-3));
+      // Columns are rounded to bytes.
+      const squares = found.map((value, direction) => (value - expected[direction]) ** 2);
+      expect(Math.max(...squares)).toBeLessThan(0.02 ** 2);
+      expect(squares.reduce((sum, each) => sum + each, 0) / squares.length).toBeLessThan(0.004 ** 2);
     });
     const off = distancesOf(tables, 0).reduce((sum, value, k) => sum + Math.abs(value - known.distances[1][k]), 0);
     expect(off).toBeGreaterThan(1);
@@ -57,6 +61,15 @@ describe("the compact file", () => {
     huge.fill(255, 20, 40);
     expect(() => readCompactFile(huge)).toThrow("announces what it cannot hold");
   });
+});
+
+it("halves rows of directions as Python", () => {
+  const rows = known.halved_rows.map((row: number[]) => Float32Array.from(row));
+  const found = halved(rows, Float32Array.from(known.halved_root_weight));
+  known.halved.forEach((row: number[], k: number) => {
+    row.forEach((value, place) => expect(Math.abs(found[k][place] - value)).toBeLessThan(1e-3));
+  });
+  expect(Math.abs(found[0][5] - known.halved[1][5])).toBeGreaterThan(0.01);
 });
 
 it("takes the first row of a vertex in the paper's form", () => {

@@ -1,10 +1,6 @@
 """The compact codes as one file, every number through the entropy coder.
 
-Layout: 8 bytes of magic; then little-endian: version and resolution (uint16 each), step
-(float64), R, K, M, V, W (uint32 each); then the code of all numbers, in this order: ranks, levels,
-clusters' numbers of the vertices (moved to front), the shared basis, centres, clusters' vectors,
-weights. Contexts tell the coder how large a number is likely to be: from its sigma, from how
-far it is from the constant cosine, from its place in the shared basis.
+docs/ssdf_file.md is its specification: parts, contexts, coder and what the numbers mean.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from pipelines.ssdf_lighting.compression.decoder_tables import DecoderTables
+from pipelines.ssdf_lighting.compression.resident import ResidentTables
 
 Floats = NDArray[np.float32]
 
@@ -21,6 +22,14 @@ def decoded_along(tables: DecoderTables, vertices: NDArray[np.integer], axes: Fl
     """d (P, L) float32, radians, of vertices (P,) along unit vectors (P, L, 3) float32."""
     found = np.empty(axes.shape[:2], np.float32)
     _decode(tables, vertices.astype(np.int64), np.ascontiguousarray(axes, dtype=np.float32), found)
+    return found
+
+
+def resident_along(tables: ResidentTables, vertices: NDArray[np.integer], axes: Floats) -> Floats:
+    """The same from what is resident: columns are read as they are, none is unfolded."""
+    found = np.empty(axes.shape[:2], np.float32)
+    ways = np.ascontiguousarray(axes, dtype=np.float32)
+    _read_codes(tables, vertices.astype(np.int64), ways, found)
     return found
 
 
@@ -85,6 +94,45 @@ def _decode(
                 there = table[place]
                 for k in range(width - 1):
                     there += weight[k] * table[place + 1 + k]
+                distance += shares[tap] * there
+            found[row, lobe] = distance
+
+
+@njit(cache=True, nogil=True, parallel=True, fastmath={"reassoc", "contract", "nsz"})
+def _read_codes(
+    tables: ResidentTables, vertices: NDArray[np.int64], axes: Floats, found: Floats
+) -> None:
+    n = tables.resolution
+    for row in prange(len(axes)):
+        texels, shares = np.empty(4, np.int64), np.empty(4, np.float32)
+        vertex = vertices[row]
+        own = tables.cluster[vertex]
+        wide, middle, narrow = tables.counts[own]
+        words, whole, halves = tables.starts[own]
+        pairs = (narrow + 1) // 2
+        # Each code's factor: the centre's weight is 1, and so is that of what pads a pair, 0.
+        factor = np.zeros(wide + middle + 2 * pairs, np.float32)
+        factor[0] = tables.scale[tables.scale_start[own]]
+        for k in range(1, wide + middle + narrow):
+            code = tables.weights[tables.weight_start[vertex] + k - 1]
+            factor[k] = tables.scale[tables.scale_start[own] + k] * code
+        for lobe in range(axes.shape[1]):
+            _taps(n, axes[row, lobe], texels, shares)
+            distance = np.float32(0.0)
+            for tap in range(4):
+                there = np.float32(0.0)
+                place = np.int64(words) + texels[tap] * wide
+                for k in range(wide):
+                    there += factor[k] * tables.words[place + k]
+                place = np.int64(whole) + texels[tap] * middle
+                for k in range(middle):
+                    there += factor[wide + k] * tables.bytes[place + k]
+                place = np.int64(halves) + texels[tap] * pairs
+                for k in range(pairs):
+                    pair = np.int32(tables.nibbles[place + k])
+                    at = wide + middle + 2 * k
+                    there += factor[at] * np.float32((pair & 15) - 8)
+                    there += factor[at + 1] * np.float32((pair >> 4) - 8)
                 distance += shares[tap] * there
             found[row, lobe] = distance
 

@@ -13,8 +13,10 @@ from assets_defs.ssdf_lighting.datasets import decoder_of
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.decoder_tables import decoded_rows
 from storage.packages import Package, read_package
+from storage.readers.bad_input import BadInput
 from tests import lit_packages
 from tsuya.exports import find_format
+from tsuya.exports.lit_scene import write_glb, write_usd
 from tsuya.exports.lit_tables import decoder_tables
 
 
@@ -149,6 +151,16 @@ def test_usd_is_read_by_openusd(package: Package, tmp_path: Path) -> None:
     assert turn.TransformDir(Gf.Vec3d(1, 0, 0)) == Gf.Vec3d(0, 1, 0)  # a quarter from the left: 90
     exr = dome.GetTextureFileAttr().Get().resolvedPath
     assert np.allclose(_exr(exr), package.array("environment"), rtol=1e-3)
+
+
+@pytest.mark.parametrize("write", [write_glb, write_usd])
+def test_a_package_of_before_is_refused(package: Package, tmp_path: Path, write: Any) -> None:
+    """Schema 1 has no reflected light."""
+    old = read_package(package.whole(), "old.tsuya")
+    old.meta["schema"] = 1
+    with pytest.raises(BadInput, match=r"old.tsuya: schema .* 1.*make the package again"):
+        write(old, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def _png(path: str) -> Any:

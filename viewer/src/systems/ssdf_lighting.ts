@@ -5,6 +5,7 @@ import type { Camera, Vector } from "../drawing/camera";
 import { drawScene } from "../drawing/scene";
 import type { Surface } from "../drawing/surface";
 import type { Bounds, Context, Control, LiveView, State, SystemViewer } from "../live_view";
+import { BadPackage } from "../package/bad_package";
 import type { MeshData } from "../package/mesh";
 import type { Package } from "../package/package";
 import { ask } from "./ssdf_lighting/ask";
@@ -42,6 +43,7 @@ interface Probe {
   irradianceError: number;
 }
 
+const SCHEMA = 2;
 const SHOWN_ROWS = 128; // of a user's environment
 
 /** What was read; the distances may still be decoded when the first frame is drawn. */
@@ -57,6 +59,9 @@ interface Loaded {
 const viewer: SystemViewer = {
   name: "ssdf_lighting",
   async make(pkg, context) {
+    if (pkg.meta.schema !== SCHEMA) {
+      throw new BadPackage(pkg.name, "schema", `${pkg.meta.schema}`, `${SCHEMA}: make the package again`);
+    }
     const distances = readDistances(pkg);
     distances.catch(() => {}); // told by `update`
     const [mesh, materials, probe, triangleCluster, bounce] = await Promise.all([
@@ -140,7 +145,7 @@ class LitView implements LiveView {
     SOURCE.values.forEach((row, vertex) => (this.vertexOfRow[row] = vertex));
     this.show(loaded.probe);
     this.whole = loaded.distances.then((tables) => {
-      this.distanceBytes = 2 * tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
+      this.distanceBytes = tables.vectors.length + 4 * (tables.weights.length + tables.sources.length);
       if (this.ended) return;
       this.edges.load(tables);
       context.requestDraw();

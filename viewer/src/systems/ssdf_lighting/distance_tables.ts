@@ -1,17 +1,21 @@
 /** Compressed SSDFs laid out for the graphics card: what `ssdf_lookup.glsl` reads. */
 
 import type { CompactCodes } from "./compact_file";
+import { LEAST_HALVED, halved } from "./half_resolution";
 
 const MEMORY_STEP = 0.5; // of the shared basis in memory over q
 const LEVELS_PER_OCTAVE = 4;
 
 /** Lines of texels of four numbers. */
 export interface DistanceTables {
-  /** n of n x n directions. */
+  /** n of n x n places. */
   resolution: number;
-  /** For each cluster, direction by direction: its centre, its vectors, zeros to whole texels. */
-  vectors: Float32Array;
-  /** For each vertex: 1, its weights, zeros. */
+  /**
+   * Bytes, read as 0 to 1: for each cluster, place by place, 1, its centre, what rounding left of the
+   * centre, its vectors, zeros to whole texels.
+   */
+  vectors: Uint8Array;
+  /** For each vertex: the factors of these columns, zeros. */
   weights: Float32Array;
   /** (V, 4): texel of the cluster's first, texels a direction, texel of the weights, 0. */
   sources: Float32Array;
@@ -29,9 +33,14 @@ export interface PapersForm {
 
 /** Tables of the compact form; rootWeight (n²). */
 export function tablesOfCodes(codes: CompactCodes, rootWeight: Float32Array): DistanceTables {
-  const { step, ranks, centre, basis, level, sizes, cluster, resolution } = codes;
+  const { step, ranks, centre, basis, level, sizes, cluster } = codes;
+  let resolution = codes.resolution;
+  let shared = sharedVectors(codes, rootWeight);
+  if (resolution >= LEAST_HALVED) {
+    shared = halved(shared, rootWeight);
+    resolution /= 2;
+  }
   const directions = resolution * resolution;
-  const shared = sharedVectors(codes, rootWeight);
   const rank = codes.sharedLevel.length;
   const laid = layOut(ranks, directions);
   const row = new Float32Array(directions);
@@ -149,18 +158,43 @@ function addEight(row: Float32Array, [a, b, c, d, e, f, g, h]: Float32Array[], f
   }
 }
 
-/** Room for clusters of so many vectors, centres not counted. */
+const BEFORE = 3; // columns before the vectors: 1, the centre, what is left of it
+
+/** Room for clusters of so many vectors. */
 function layOut(ranks: Int32Array, directions: number) {
-  const texels = Int32Array.from(ranks, (rank) => Math.ceil((rank + 1) / 4));
+  const texels = Int32Array.from(ranks, (rank) => Math.ceil((rank + BEFORE) / 4));
   const starts = new Uint32Array(ranks.length + 1);
   texels.forEach((count, own) => (starts[own + 1] = starts[own] + count * directions));
-  const vectors = new Float32Array(4 * starts[ranks.length]);
+  const vectors = new Uint8Array(4 * starts[ranks.length]);
+  // Of a column: what byte 0 stands for, and how much more 255 does.
+  const lows = Array.from(texels, (count) => new Float64Array(4 * count));
+  const spans = Array.from(texels, (count) => new Float64Array(4 * count));
+  texels.forEach((count, own) => {
+    const to = 4 * starts[own];
+    for (let k = 0; k < directions; k++) vectors[to + 4 * count * k] = 255;
+  });
+
+  /** Rounds a column, and returns what is left. */
+  function write(own: number, column: number, row: Float32Array): Float32Array {
+    const low = row.reduce((least, value) => Math.min(least, value), Infinity);
+    const span = row.reduce((most, value) => Math.max(most, value), -Infinity) - low;
+    const width = 4 * texels[own];
+    const left = new Float32Array(directions);
+    let to = 4 * starts[own] + column;
+    for (let k = 0; k < directions; k++, to += width) {
+      vectors[to] = span > 0 ? Math.round((255 * (row[k] - low)) / span) : 0;
+      left[k] = row[k] - low - (vectors[to] * span) / 255;
+    }
+    lows[own][column] = low;
+    spans[own][column] = span;
+    return left;
+  }
+
   return {
     /** Vector `place` of a cluster: 0 is its centre. */
     put(own: number, place: number, row: Float32Array): void {
-      const width = 4 * texels[own];
-      let to = 4 * starts[own] + place;
-      for (let k = 0; k < directions; k++, to += width) vectors[to] = row[k];
+      if (place) write(own, BEFORE - 1 + place, row);
+      else write(own, 2, write(own, 1, row));
     },
     /** The tables of vertices of these clusters, whose weights begin there. */
     tables(resolution: number, of: { start: number; own: number }[], values: Float32Array): DistanceTables {
@@ -169,8 +203,13 @@ function layOut(ranks: Int32Array, directions: number) {
       let at = 0;
       of.forEach(({ start, own }, vertex) => {
         sources.set([starts[own], texels[own], at], 4 * vertex);
-        weights[4 * at] = 1;
-        weights.set(values.subarray(start, start + ranks[own]), 4 * at + 1);
+        let base = 0;
+        for (let column = 1; column < BEFORE + ranks[own]; column++) {
+          const weight = column < BEFORE ? 1 : values[start + column - BEFORE];
+          base += weight * lows[own][column];
+          weights[4 * at + column] = weight * spans[own][column];
+        }
+        weights[4 * at] = base;
         at += texels[own];
       });
       return { resolution, vectors, weights, sources };

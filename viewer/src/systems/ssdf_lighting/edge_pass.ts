@@ -80,7 +80,7 @@ export class EdgePass {
       vertexNormals: { value: lineTexture(normals, COLUMNS) },
       vertexSources: { value: lineTexture(tables.sources, COLUMNS) },
       vertexWeights: { value: lineTexture(tables.weights, LINE) },
-      clusterVectors: { value: lineTexture(tables.vectors, LINE, true) },
+      clusterVectors: { value: lineTexture(tables.vectors, LINE) },
       glossAxes: { value: tableTexture(values, columns, values.length / 4 / columns) },
       mattAxes: { value: null as THREE.Texture | null },
     };

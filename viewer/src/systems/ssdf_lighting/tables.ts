@@ -2,11 +2,10 @@
 
 import * as THREE from "three";
 
-/** Rows of texels (height, width, 4), as floats or, half as large, as halfs. */
-export function tableTexture(values: Float32Array, width: number, height: number, halfs = false): THREE.DataTexture {
-  const content = halfs ? Uint16Array.from(values, (value) => THREE.DataUtils.toHalfFloat(value)) : values;
-  const type = halfs ? THREE.HalfFloatType : THREE.FloatType;
-  const made = new THREE.DataTexture(content as never, width, height, THREE.RGBAFormat, type);
+/** Rows of texels (height, width, 4), as floats or as bytes, which are read as 0 to 1. */
+export function tableTexture(values: Float32Array | Uint8Array, width: number, height: number): THREE.DataTexture {
+  const type = values instanceof Uint8Array ? THREE.UnsignedByteType : THREE.FloatType;
+  const made = new THREE.DataTexture(values as never, width, height, THREE.RGBAFormat, type);
   made.magFilter = made.minFilter = THREE.NearestFilter;
   made.unpackAlignment = 1;
   made.needsUpdate = true;
@@ -14,9 +13,10 @@ export function tableTexture(values: Float32Array, width: number, height: number
 }
 
 /** A line of texels (count, 4), wrapped into rows of so many columns. */
-export function lineTexture(values: Float32Array, columns: number, halfs = false): THREE.DataTexture {
+export function lineTexture(values: Float32Array | Uint8Array, columns: number): THREE.DataTexture {
   const rows = Math.max(1, Math.ceil(values.length / 4 / columns));
-  const whole = new Float32Array(4 * columns * rows);
+  const length = 4 * columns * rows;
+  const whole = values instanceof Uint8Array ? new Uint8Array(length) : new Float32Array(length);
   whole.set(values);
-  return tableTexture(whole, columns, rows, halfs);
+  return tableTexture(whole, columns, rows);
 }
