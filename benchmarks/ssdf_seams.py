@@ -59,7 +59,8 @@ def seam_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
 
 
 def _offset(decoder: Decoder, offset: Floats, vertices: NDArray[np.int64], axes: Floats) -> Floats:
-    return decoder.distances_along(vertices, axes) + offset[decoder.resident.cluster[vertices], None]
+    clusters = decoder.resident.cluster[vertices]
+    return decoder.distances_along(vertices, axes) + offset[clusters, None]
 
 
 def brightness(scene: Scene, distances_along: DistancesAlong) -> NDArray[np.float64]:
