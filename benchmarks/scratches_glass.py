@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
+from pipelines.drawing.picture_metrics import flip_map
 from pipelines.geometry.solid_shapes import glass_teapot, plate
 from pipelines.geometry.solids import Solid
 from pipelines.glass_scratches.drawing.denoising import denoised
@@ -125,7 +126,7 @@ def _blocks(picture: NDArray[Any]) -> NDArray[Any]:
 
 def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
     """FLIP of the stage's pictures against traced and denoised ones: plate and teapot, far and
-    close, walls of each kind; null: the stage without the glass."""
+    close, walls of each kind; null: the stage's picture moved by half its width."""
     layers = make_layers(SETTINGS["setting_2"], 3)
     solids = {"plate": plate(1.5, 1.1, 0.05), "teapot": glass_teapot(14, 0.05)}
     flips: dict[str, float] = {}
@@ -147,8 +148,6 @@ def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
 
 
 def _flips(glass: ScratchedGlass, light: EnvironmentSampler, view: int) -> tuple[float, float]:
-    from flip_evaluator import evaluate
-
     camera = object_cameras(glass.solid)[view]
     traced = denoised(trace_view(glass, light, camera, size=STAGE_SIZE, samples=STAGE_SAMPLES))
     stage = draw_scratched(
@@ -157,10 +156,5 @@ def _flips(glass: ScratchedGlass, light: EnvironmentSampler, view: int) -> tuple
     empty = np.roll(stage, STAGE_SIZE // 2, axis=1)
     exposure = picture_exposure(traced)
 
-    def shown(radiance: NDArray[Any]) -> NDArray[np.float32]:
-        return to_8bit(radiance * exposure).astype(np.float32) / 255.0
-
-    return tuple(
-        float(evaluate(shown(traced), shown(other), "LDR", inputsRGB=True)[1])
-        for other in (stage, empty)
-    )  # type: ignore[return-value]
+    truth, one, null = (to_8bit(each * exposure) for each in (traced, stage, empty))
+    return float(flip_map(one, truth).mean()), float(flip_map(null, truth).mean())

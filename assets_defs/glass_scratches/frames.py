@@ -252,10 +252,10 @@ def _denoised_change(version: StoredVersion) -> float:
     return denoised_change(version.dataset["clean"].values, version.dataset["radiance"].values)
 
 
-def _stage_brightness(version: StoredVersion) -> float:
-    """Mean of the stage's pictures over that of the traced ones."""
-    dataset = version.dataset
-    return float(dataset["stage"].values.mean() / dataset["frames"].values.mean())
+def _stage_flip(version: StoredVersion) -> float:
+    from pipelines.glass_scratches.figures import stage_flip
+
+    return stage_flip(version.dataset["frames"].values, version.dataset["stage"].values)
 
 
 def _scratched_share(version: StoredVersion) -> float:
@@ -318,12 +318,11 @@ def _scratched_share(version: StoredVersion) -> float:
             at_most=0.2,  # two paths a pixel find some of the light only by chance
         ),
         Check(
-            "stage_brightness",
-            "Mean of the stage's pictures over that of the traced ones.",
-            _stage_brightness,
-            at_least=0.3,
-            at_most=2.0,
-            change=0.05,
+            "stage_flip",
+            "FLIP of the stage's pictures against traced and denoised ones, mean of whole frames.",
+            _stage_flip,
+            at_most=0.25,
+            change=0.03,
         ),
     ),
 )

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.drawing.picture_metrics import flip_map
 from pipelines.glass_scratches.layers.coverage import coverage_maps
 from pipelines.glass_scratches.layers.features import Layers
 from pipelines.glass_scratches.layers.settings import LayerSpec
@@ -268,6 +269,13 @@ def denoised_change(clean: NDArray[np.floating], traced: NDArray[np.floating]) -
     """
     before, after = (each.mean(axis=(1, 2, 3), dtype=np.float64) for each in (traced, clean))
     return float(np.abs(after / before - 1).max())
+
+
+def stage_flip(traced: NDArray[np.uint8], stage: NDArray[np.uint8]) -> float:
+    """FLIP of pictures (views, H, W, 3) of the stage against traced ones, mean of whole frames."""
+    return float(
+        np.mean([flip_map(one, true).mean() for one, true in zip(stage, traced, strict=True)])
+    )
 
 
 def impossible_share(radiance: NDArray[np.floating]) -> float:

@@ -302,10 +302,17 @@ REGRESSIONS = (
         KEYS,
     ),
     Regression(
-        "stage_brightness",
+        "stage_flip",
         frames,
         "draw_scratched",
-        lambda right, *arguments, **options: right(*arguments, **options) * np.float32(0.05),
+        lambda right, *arguments, **options: np.roll(right(*arguments, **options), 4, axis=1),
+        KEYS,
+    ),
+    Regression(
+        "stage_flip",
+        frames,
+        "draw_scratched",
+        lambda right, *arguments, **options: right(*arguments, **options) * np.float32(0.3),
         KEYS,
     ),
     Regression(
