@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from pipelines.drawing.stage import Camera
     from pipelines.ssdf_lighting.drawing.live_parts import ReferenceView
+    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
     from storage.packages import Contents, Figure, Mesh, Source, View
 
 _BUILT_IN = "Apache-2.0 (made by Tsuya)"
@@ -149,7 +150,7 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
     from pipelines.ssdf_lighting.drawing import live_parts
     from pipelines.ssdf_lighting.drawing.viewpoints import scene_camera, viewpoint
 
-    scene, lights = scene_of(inputs.scene_mesh), lights_of(inputs.environment_lights)
+    scene, lights = scene_of(inputs.scene_mesh), _lights(inputs)
     distances = decoder_of(inputs.ssdf_basis).distances_along
     size = (settings.view_width, settings.view_width * 3 // 4)
     view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
@@ -170,6 +171,13 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
             bounce,
         ),
     )
+
+
+def _lights(inputs: _Inputs) -> Lights:
+    """As sharp as the distances are exact."""
+    from pipelines.ssdf_lighting.light.spherical_gaussians import softened
+
+    return softened(lights_of(inputs.environment_lights), float(inputs.ssdf_basis["rmse"]))
 
 
 def _contents(
@@ -222,7 +230,7 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
 
     from pipelines.ssdf_lighting.drawing import live_parts
 
-    scene, lights = scene_of(inputs.scene_mesh), inputs.environment_lights
+    scene, radiance = scene_of(inputs.scene_mesh), inputs.environment_lights["radiance"].values
     tint = scene.materials.tint
     of_materials = {
         "albedo": scene.materials.albedo,
@@ -238,11 +246,11 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
         **(_varying(inputs.scene_mesh) if "texels" in inputs.scene_mesh else {}),
         **_distances(inputs.ssdf_basis),
         **{
-            f"light_{name}": lights[name].values.astype(np.float32)
-            for name in ("axes", "sharpness", "amplitudes")
+            f"light_{name}": values.astype(np.float32)
+            for name, values in _lights(inputs)._asdict().items()
         },
         **{f"bounce_{name}": part.values for name, part in inputs.bounce_factors.items()},
-        "environment": live_parts.shown_environment(lights["radiance"].values),
+        "environment": live_parts.shown_environment(radiance),
     }
 
 
