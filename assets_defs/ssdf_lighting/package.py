@@ -72,8 +72,8 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
             expected[f"map_{number:03d}"] = texels.reshape(height, width, 3)
     for name in ("albedo", "specular", "roughness"):
         expected[name] = scene[name].values.astype(np.float32)
-    for name in ("axes", "sharpness", "amplitudes"):
-        expected[f"light_{name}"] = lights[name].values.astype(np.float32)
+    for name, values in _lights(lights, basis)._asdict().items():
+        expected[f"light_{name}"] = values.astype(np.float32)
     return {
         **expected,
         "triangle_cluster": clusters["cluster"].values.astype(np.uint16),
@@ -150,7 +150,8 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
     from pipelines.ssdf_lighting.drawing import live_parts
     from pipelines.ssdf_lighting.drawing.viewpoints import scene_camera, viewpoint
 
-    scene, lights = scene_of(inputs.scene_mesh), _lights(inputs)
+    scene = scene_of(inputs.scene_mesh)
+    lights = _lights(inputs.environment_lights, inputs.ssdf_basis)
     distances = decoder_of(inputs.ssdf_basis).distances_along
     size = (settings.view_width, settings.view_width * 3 // 4)
     view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
@@ -173,11 +174,11 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
     )
 
 
-def _lights(inputs: _Inputs) -> Lights:
+def _lights(environment_lights: xr.Dataset, ssdf_basis: xr.Dataset) -> Lights:
     """As sharp as the distances are exact."""
     from pipelines.ssdf_lighting.light.spherical_gaussians import softened
 
-    return softened(lights_of(inputs.environment_lights), float(inputs.ssdf_basis["rmse"]))
+    return softened(lights_of(environment_lights), float(ssdf_basis["rmse"]))
 
 
 def _contents(
@@ -231,6 +232,7 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
     from pipelines.ssdf_lighting.drawing import live_parts
 
     scene, radiance = scene_of(inputs.scene_mesh), inputs.environment_lights["radiance"].values
+    lights = _lights(inputs.environment_lights, inputs.ssdf_basis)
     tint = scene.materials.tint
     of_materials = {
         "albedo": scene.materials.albedo,
@@ -245,10 +247,7 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
         "gloss_lobes": live_parts.gloss_table(scene),
         **(_varying(inputs.scene_mesh) if "texels" in inputs.scene_mesh else {}),
         **_distances(inputs.ssdf_basis),
-        **{
-            f"light_{name}": values.astype(np.float32)
-            for name, values in _lights(inputs)._asdict().items()
-        },
+        **{f"light_{name}": values.astype(np.float32) for name, values in lights._asdict().items()},
         **{f"bounce_{name}": part.values for name, part in inputs.bounce_factors.items()},
         "environment": live_parts.shown_environment(radiance),
     }
