@@ -1,7 +1,7 @@
 """Figures of SSDF lighting: the paper's table, bytes at equal error, speed, and pictures.
 
-The default scale makes the default scene once, twice and four times as fine; ``--scale paper``
-sixteen times, too. docs/ssdf.md says what each figure means.
+The default scale makes the default scene once and twice as fine; ``--scale paper`` four and sixteen
+times, too. docs/ssdf.md says what each figure means.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ PAPER_CLUSTERS, PAPER_VALUES, PAPER_CONTRIBUTION = 64, 48, 0.9
 PAPER_ERRORS = {"error_48": 0.312758, "error_90": 1.4008}
 PAPER_MB = {"raw": 266.0, "48": 66.4, "90": 22.2}
 """The paper's table, MB of 2^20 bytes."""
-FACTORS = {"default": (1, 2, 4), "paper": (1, 2, 4, 16)}
-SINGLE_FACTORS = {"default": (1, 4), "paper": (1, 4, 16)}
+FACTORS = {"default": (1, 2), "paper": (1, 2, 4, 16)}
+SINGLE_FACTORS = {"default": (1, 2), "paper": (1, 4, 16)}
 CURVE_VALUES = (4, 8, 16, 32, 48, 64, 96)
 CURVE_CLUSTERS = (1, 4, 16, 64, 256)
 CURVE_STEPS = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)

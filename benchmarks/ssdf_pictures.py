@@ -18,14 +18,13 @@ import xarray as xr
 from PIL import Image
 
 from assets_defs.ssdf_lighting.datasets import decoder_of, scene_of
-from assets_defs.ssdf_lighting.lights import LightSettings
 from assets_defs.workspace import CHECKOUT
-from pipelines.light import built_in_environments
+from benchmarks.ssdf_relit import sky_lights
 from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.drawing import frames, viewpoints
 from pipelines.ssdf_lighting.drawing.pictures import error_map
 from pipelines.ssdf_lighting.figures import psnr
-from pipelines.ssdf_lighting.light.environment_fit import fit_lights
+from pipelines.ssdf_lighting.light.spherical_gaussians import softened
 from pipelines.ssdf_lighting.scene import Scene
 
 SIZE = (640, 480)
@@ -36,20 +35,11 @@ PICTURE = CHECKOUT / "docs" / "pictures" / "ssdf-mitsuba.png"
 
 def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
     """Frames a second while the light turns, PSNR, and the picture of where Mitsuba differs."""
-    scene, settings = scene_of(stored("scene_mesh")), LightSettings()
-    sky = built_in_environments.sky(
-        256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
-    )
-    lights = fit_lights(
-        sky,
-        settings.lights,
-        least_sharpness=settings.least_sharpness,
-        most_sharpness=settings.most_sharpness,
-    ).lights
+    scene, basis = scene_of(stored("scene_mesh")), stored("ssdf_basis")
+    lights = softened(sky_lights(), float(basis["rmse"]))
     around, above = viewpoints.AZIMUTH, viewpoints.ELEVATION
     camera = viewpoints.scene_camera(scene, around, above, SIZE[0] / SIZE[1])
     matrix = stored("ssdf_matrix")["distances"].values
-    basis = stored("ssdf_basis")
     decoder = decoder_of(basis)
     compressed = decoder.distances_along
     uncompressed = functools.partial(matrix_along, matrix)
@@ -83,7 +73,7 @@ def picture_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         "relight_fps": 1.0 / float(np.median(turn.seconds)),
         "relight_ms_slowest": 1000.0 * float(turn.seconds[1:].max()),
         "renderer": turn.renderer,
-        "lights": settings.lights,
+        "lights": len(lights.sharpness),
         "sharpest_light": float(lights.sharpness.max()),
         "relit_psnr_db": min(psnrs),
         "relit_psnr_db_mean": float(np.mean(psnrs)),

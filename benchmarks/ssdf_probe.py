@@ -42,7 +42,7 @@ from pipelines.ssdf_lighting.drawing import frames, viewpoints
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.light.interreflection import BounceFactors, bounce_factors
 from pipelines.ssdf_lighting.light.sphere_maps import fluxes
-from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, integral, softened
 from pipelines.ssdf_lighting.scene import Scene
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ def _drawn(
 ) -> frames.TurningLight:
     return frames.draw_turning_light(
         prepared.scene,
-        lights,
+        softened(lights, RMSE),
         along,
         prepared.camera,
         SIZE,

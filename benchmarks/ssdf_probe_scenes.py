@@ -56,7 +56,7 @@ def colonnade() -> Scene:
     parts.append(_box((0.1, 1.9, 1.5), (-1.6, 0.1, 0.75), 0.0))
     parts.append(_floor(1, 4.4, 0.0))
     colours = [[0.7, 0.66, 0.58]] * 4 + [[0.66, 0.62, 0.55], [0.62, 0.3, 0.2], [0.28, 0.42, 0.55]]
-    return _scene(parts, [*colours, [0.55, 0.54, 0.52]], [0.0] * 8, 0.03)
+    return _scene(parts, [*colours, [0.55, 0.54, 0.52]], [0.0] * 8, 0.04)
 
 
 def _scene(

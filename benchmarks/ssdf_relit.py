@@ -16,9 +16,25 @@ from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.drawing import frames, viewpoints
 from pipelines.ssdf_lighting.figures import psnr
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
+from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, softened
 
 SIZE = (640, 480)
 TURNS = tuple(60.0 * number for number in range(6))
+
+
+@functools.lru_cache(maxsize=1)
+def sky_lights() -> Lights:
+    """The built-in sky's, by the graph's own settings."""
+    settings = LightSettings()
+    sky = built_in_environments.sky(
+        256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
+    )
+    return fit_lights(
+        sky,
+        settings.lights,
+        least_sharpness=settings.least_sharpness,
+        most_sharpness=settings.most_sharpness,
+    ).lights
 
 
 def relit_judge(
@@ -26,16 +42,8 @@ def relit_judge(
 ) -> Callable[[frames.DistancesAlong], dict[str, Any]]:
     """Of distances along axes: `relit_psnr_db`, 8-bit codes of the stage's pictures, the worst of
     six turns, its mean, and `relight_fps`."""
-    scene, settings = scene_of(stored("scene_mesh")), LightSettings()
-    sky = built_in_environments.sky(
-        256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
-    )
-    lights = fit_lights(
-        sky,
-        settings.lights,
-        least_sharpness=settings.least_sharpness,
-        most_sharpness=settings.most_sharpness,
-    ).lights
+    scene = scene_of(stored("scene_mesh"))
+    lights = softened(sky_lights(), float(stored("ssdf_basis")["rmse"]))
     camera = viewpoints.scene_camera(
         scene, viewpoints.AZIMUTH, viewpoints.ELEVATION, SIZE[0] / SIZE[1]
     )

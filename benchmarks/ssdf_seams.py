@@ -17,9 +17,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from assets_defs.ssdf_lighting.datasets import decoder_of, scene_of, shared_basis_of
-from assets_defs.ssdf_lighting.lights import LightSettings
+from benchmarks.ssdf_relit import sky_lights
 from pipelines.drawing.colour import luminance
-from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting.compression import compact
 from pipelines.ssdf_lighting.compression.compact_file import to_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
@@ -27,9 +26,13 @@ from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.drawing import viewpoints
 from pipelines.ssdf_lighting.drawing.camera_rays import view_vectors
 from pipelines.ssdf_lighting.figures import seam_ratio
-from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.light.shading import lobe_tables, lobes, shaded
-from pipelines.ssdf_lighting.light.spherical_gaussians import Lights, rotated, visible_table
+from pipelines.ssdf_lighting.light.spherical_gaussians import (
+    Lights,
+    rotated,
+    softened,
+    visible_table,
+)
 from pipelines.ssdf_lighting.scene import Scene
 
 Floats = NDArray[np.float32]
@@ -51,22 +54,26 @@ def seam_figures(stored: Callable[[str], xr.Dataset]) -> dict[str, Any]:
         "seam_ratio_single_pca": Decoder.of_file(to_bytes(one)).distances_along,
         "seam_ratio_null": functools.partial(_offset, decoder, offset.astype(np.float32)),
     }
-    right = brightness(scene, functools.partial(matrix_along, matrix))
+    lights = softened(sky_lights(), rmse)
+    right = brightness(scene, lights, functools.partial(matrix_along, matrix))
     return {
-        name: seam_ratio(brightness(scene, along) - right, scene.triangles, cluster)
+        name: seam_ratio(brightness(scene, lights, along) - right, scene.triangles, cluster)
         for name, along in codings.items()
     }
 
 
 def _offset(decoder: Decoder, offset: Floats, vertices: NDArray[np.int64], axes: Floats) -> Floats:
-    clusters = decoder.resident.cluster[vertices]
-    return decoder.distances_along(vertices, axes) + offset[clusters, None]
+    return (
+        decoder.distances_along(vertices, axes) + offset[decoder.resident.cluster[vertices], None]
+    )
 
 
-def brightness(scene: Scene, distances_along: DistancesAlong) -> NDArray[np.float64]:
-    """Luminance (V, turns) of the vertices under the built-in sky, seen from the usual place."""
+def brightness(
+    scene: Scene, lights: Lights, distances_along: DistancesAlong
+) -> NDArray[np.float64]:
+    """Luminance (V, turns) of the vertices under such lights, seen from the usual place."""
     camera = viewpoints.scene_camera(scene, viewpoints.AZIMUTH, viewpoints.ELEVATION, 4.0 / 3.0)
-    lights, material = _sky(), np.zeros(len(scene.vertices), np.int64)
+    material = np.zeros(len(scene.vertices), np.int64)
     material[scene.triangles] = scene.part[:, None]
     tables, shares = lobe_tables(scene.materials, lights), visible_table()
     vertices, views = np.arange(len(scene.vertices)), view_vectors(camera, scene.vertices)
@@ -77,17 +84,3 @@ def brightness(scene: Scene, distances_along: DistancesAlong) -> NDArray[np.floa
         distances = distances_along(vertices, seen.axes.astype(np.float32))
         found.append(luminance(shaded(seen, distances.astype(np.float64), shares)))
     return np.stack(found, axis=1)
-
-
-@functools.lru_cache(maxsize=1)
-def _sky() -> Lights:
-    settings = LightSettings()
-    sky = built_in_environments.sky(
-        256, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation
-    )
-    return fit_lights(
-        sky,
-        settings.lights,
-        least_sharpness=settings.least_sharpness,
-        most_sharpness=settings.most_sharpness,
-    ).lights

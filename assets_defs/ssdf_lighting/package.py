@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from pipelines.drawing.stage import Camera
     from pipelines.ssdf_lighting.drawing.live_parts import ReferenceView
+    from pipelines.ssdf_lighting.light.spherical_gaussians import Lights
     from storage.packages import Contents, Figure, Mesh, Source, View
 
 _BUILT_IN = "Apache-2.0 (made by Tsuya)"
@@ -71,8 +72,8 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
             expected[f"map_{number:03d}"] = texels.reshape(height, width, 3)
     for name in ("albedo", "specular", "roughness"):
         expected[name] = scene[name].values.astype(np.float32)
-    for name in ("axes", "sharpness", "amplitudes"):
-        expected[f"light_{name}"] = lights[name].values.astype(np.float32)
+    for name, values in _lights(lights, basis)._asdict().items():
+        expected[f"light_{name}"] = values.astype(np.float32)
     return {
         **expected,
         "triangle_cluster": clusters["cluster"].values.astype(np.uint16),
@@ -149,7 +150,8 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
     from pipelines.ssdf_lighting.drawing import live_parts
     from pipelines.ssdf_lighting.drawing.viewpoints import scene_camera, viewpoint
 
-    scene, lights = scene_of(inputs.scene_mesh), lights_of(inputs.environment_lights)
+    scene = scene_of(inputs.scene_mesh)
+    lights = _lights(inputs.environment_lights, inputs.ssdf_basis)
     distances = decoder_of(inputs.ssdf_basis).distances_along
     size = (settings.view_width, settings.view_width * 3 // 4)
     view = viewpoint(scene, settings.azimuth, settings.elevation, size[0] / size[1])
@@ -170,6 +172,13 @@ def _pictures(settings: LitPackageSettings, inputs: _Inputs) -> _Pictures:
             bounce,
         ),
     )
+
+
+def _lights(environment_lights: xr.Dataset, ssdf_basis: xr.Dataset) -> Lights:
+    """As sharp as the distances are exact."""
+    from pipelines.ssdf_lighting.light.spherical_gaussians import softened
+
+    return softened(lights_of(environment_lights), float(ssdf_basis["rmse"]))
 
 
 def _contents(
@@ -222,7 +231,8 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
 
     from pipelines.ssdf_lighting.drawing import live_parts
 
-    scene, lights = scene_of(inputs.scene_mesh), inputs.environment_lights
+    scene, radiance = scene_of(inputs.scene_mesh), inputs.environment_lights["radiance"].values
+    lights = _lights(inputs.environment_lights, inputs.ssdf_basis)
     tint = scene.materials.tint
     of_materials = {
         "albedo": scene.materials.albedo,
@@ -237,12 +247,9 @@ def _values(inputs: _Inputs) -> dict[str, Any]:
         "gloss_lobes": live_parts.gloss_table(scene),
         **(_varying(inputs.scene_mesh) if "texels" in inputs.scene_mesh else {}),
         **_distances(inputs.ssdf_basis),
-        **{
-            f"light_{name}": lights[name].values.astype(np.float32)
-            for name in ("axes", "sharpness", "amplitudes")
-        },
+        **{f"light_{name}": values.astype(np.float32) for name, values in lights._asdict().items()},
         **{f"bounce_{name}": part.values for name, part in inputs.bounce_factors.items()},
-        "environment": live_parts.shown_environment(lights["radiance"].values),
+        "environment": live_parts.shown_environment(radiance),
     }
 
 

@@ -25,6 +25,7 @@ from pipelines.ssdf_lighting.light.cosine_lobes import cosine_lobes
 from pipelines.ssdf_lighting.light.environment_fit import fit_lights
 from pipelines.ssdf_lighting.light.interreflection import BounceFactors, bounced
 from pipelines.ssdf_lighting.light.sphere_maps import downsampled
+from pipelines.ssdf_lighting.light.spherical_gaussians import softened
 from pipelines.ssdf_lighting.light.suns import split_suns
 
 NAME = "ssdf_lighting.json"
@@ -83,7 +84,14 @@ def _suns() -> dict[str, Any]:
         axis = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         radiance[ways @ np.array(axis) > np.cos(radius)] += value * np.array([1.0, 0.8, 0.5])
     suns = split_suns(radiance, 4).suns
-    return {"height": height, "discs": discs, **{k: v.tolist() for k, v in suns._asdict().items()}}
+    soft = softened(suns, 0.006)
+    return {
+        "height": height,
+        "discs": discs,
+        **{name: values.tolist() for name, values in suns._asdict().items()},
+        "soft_sharpness": soft.sharpness.tolist(),
+        "soft_amplitudes": soft.amplitudes.tolist(),
+    }
 
 
 def _bounce() -> dict[str, Any]:

@@ -13,7 +13,7 @@ import { Matrix, nonnegative, solved } from "../src/systems/ssdf_lighting/least_
 import { COLUMNS, FINE, mattTables, scaledBessel0, scaledBessel1 } from "../src/systems/ssdf_lighting/lobe_tables";
 import { readRadiance } from "../src/systems/ssdf_lighting/probe_files";
 import { Sphere, downsampled } from "../src/systems/ssdf_lighting/sphere_map";
-import { splitSuns } from "../src/systems/ssdf_lighting/suns";
+import { softened, splitSuns } from "../src/systems/ssdf_lighting/suns";
 
 const known = JSON.parse(readFileSync(new URL("./ssdf_lighting.json", import.meta.url), "utf8"));
 const file = new Uint8Array(Buffer.from(known.file, "base64"));
@@ -158,6 +158,13 @@ describe("suns", () => {
       sun.amplitude.forEach((value, c) => expect(value / amplitudes[k][c]).toBeCloseTo(1, 6));
     });
     expect(Math.max(...rest)).toBeCloseTo(0.5, 9);
+  });
+
+  it("are as soft as in Python where distances have an error", () => {
+    const found = softened(Float32Array.from(sharpness), Float32Array.from(amplitudes.flat()), 0.006);
+    found.sharpness.forEach((value, k) => expect(value / known.suns.soft_sharpness[k]).toBeCloseTo(1, 5));
+    found.amplitudes.forEach((value, k) => expect(value / known.suns.soft_amplitudes.flat()[k]).toBeCloseTo(1, 5));
+    expect(found.sharpness[0]).toBeLessThan(0.8 * sharpness[0]);
   });
 
   it("are as many as asked for, brightest first", () => {

@@ -25,6 +25,8 @@ _NODES = 40  # of Gauss and Legendre: 24 already give 14 digits from λ = 0 to 1
 _FAINT = 40.0  # exponents beyond do not count: exp(-40) is 4e-18
 _AT_ONCE = 16384  # elements of an array whose nodes are in memory together
 
+_AT_EDGES = 2.0  # see ``softened``: found by pictures under a sun beside a path tracer's
+
 _ROWS, _COLUMNS = 128, 64
 _LEAST_ROWS, _LEAST_COLUMNS = 8, 4
 _ENDLESS = 1e12  # the sharpness of the last column, which stands for all that is beyond
@@ -97,6 +99,25 @@ def rotated(lights: Lights, degrees: float) -> Lights:
     cosine, sine = math.cos(angle), math.sin(angle)
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return lights._replace(axes=lights.axes @ turn.T)
+
+
+def softened(lights: Lights, rmse: float) -> Lights:
+    """Lights as distances with an error show them: none sharper than that, each with its flux.
+
+    rmse: of d, radians. An edge that is off by some angle, now here, now there, shades on average
+    as the true one does under a light that is wider by as much: variances add up, 1 / λ and the
+    error's. At the edges that are seen it is larger than over all directions, by ``_AT_EDGES``.
+    Raises ValueError for an error that is negative or not finite.
+
+    >>> sun = Lights(np.array([[0.0, 0.0, 1.0]]), np.array([185_000.0]), np.ones((1, 3)))
+    >>> softened(sun, 0.006).sharpness.round(-2).tolist()
+    [6700.0]
+    """
+    if not 0.0 <= rmse < math.inf:
+        raise ValueError(f"rmse is {rmse}; expected a finite angle of 0 or more.")
+    sharpness = 1.0 / (1.0 / lights.sharpness + (_AT_EDGES * rmse) ** 2)
+    kept = integral(lights.sharpness) / integral(sharpness)
+    return lights._replace(sharpness=sharpness, amplitudes=lights.amplitudes * kept[:, None])
 
 
 # ---- the visible part ------------------------------------------------------------------------

@@ -18,6 +18,7 @@ import { lightParts, litParts, readMaterials, type Materials } from "./ssdf_ligh
 import { COLUMNS, FINE, type MattTables } from "./ssdf_lighting/lobe_tables";
 import { readProbe } from "./ssdf_lighting/probe_files";
 import { downsampled, Sphere, type Environment } from "./ssdf_lighting/sphere_map";
+import { softened } from "./ssdf_lighting/suns";
 import { tableTexture } from "./ssdf_lighting/tables";
 
 /** What can be set. */
@@ -112,6 +113,7 @@ class LitView implements LiveView {
   private readonly backdrop = new TurnedEnvironment();
   private readonly edges: EdgePass;
   private readonly exposure: number;
+  private readonly rmse: number;
   private readonly background: Vector;
   private readonly count: number;
   private readonly vertexOfRow: Int32Array;
@@ -130,6 +132,7 @@ class LitView implements LiveView {
     private readonly loaded: Loaded,
   ) {
     this.exposure = pkg.parameter("exposure");
+    this.rmse = pkg.parameter("rmse");
     this.background = pkg.parameter<Vector>("background");
     this.probe = loaded.probe;
     this.count = loaded.probe.sharpness.length;
@@ -262,14 +265,14 @@ class LitView implements LiveView {
     environment.data.forEach((value, k, data) => (data[k] = value * scale));
     const whole = { height: given.height, data: given.data.map((value) => value * scale) };
     const fit = await ask({ kind: "fit", environment: whole, count: this.count });
-    const sharpness = Float32Array.from(fit.lights.sharpness);
+    const amplitudes = Float32Array.from(fit.lights.amplitudes);
+    const soft = softened(Float32Array.from(fit.lights.sharpness), amplitudes, this.rmse);
     this.show({
       name: file.name,
       environment,
       axes: Float32Array.from(fit.lights.axes),
-      sharpness,
-      amplitudes: Float32Array.from(fit.lights.amplitudes),
-      tables: await ask({ kind: "lobes", sharpness }),
+      ...soft,
+      tables: await ask({ kind: "lobes", sharpness: soft.sharpness }),
       irradianceError: fit.irradianceError,
     });
   }

@@ -214,7 +214,9 @@ def test_fits_repeat_for_a_seed_and_report_progress() -> None:
     assert len(told) == 7
 
 
-def test_the_bounds_of_sharpness_hold_but_for_suns(clear: NDArray[np.float32]) -> None:
+def test_the_bounds_of_sharpness_hold_but_for_suns() -> None:
+    """In a map whose texels are smaller than the sun."""
+    clear = sky(512, sun_azimuth=40.0, sun_elevation=35.0, sun_radius=0.8)
     sharpness = fit_lights(clear, 6, least_sharpness=5.0, most_sharpness=50.0).lights.sharpness
     assert sharpness[:-1].min() >= 5.0
     assert sharpness[:-1].max() <= 50.0

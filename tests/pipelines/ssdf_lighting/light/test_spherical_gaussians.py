@@ -20,6 +20,7 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import (
     integral,
     product,
     rotated,
+    softened,
     visible_integral,
     visible_share,
     visible_table,
@@ -289,3 +290,29 @@ def test_a_table_too_small_and_a_name_that_is_none_are_refused() -> None:
         visible_table(7, 64)
     with pytest.raises(ValueError, match=r"^columns is 3; expected 4 or more\.$"):
         visible_table(64, 3)
+
+
+def test_softened_lights_are_what_edges_with_an_error_show_on_average() -> None:
+    """Edges off by Gaussian noise, by quadrature; the light itself is far from their mean."""
+    sharpness, rmse = 184_889.0, 0.006
+    soft = softened(Lights(np.array([[0.0, 0, 1]]), np.array([sharpness]), np.ones((1, 3))), rmse)
+    noise, weights = np.polynomial.hermite_e.hermegauss(80)
+    distance = np.linspace(-0.04, 0.04, 41)
+    shown = visible_integral(distance[:, None] + 2.0 * rmse * noise, sharpness)
+    mean = shown @ weights / weights.sum() / integral(sharpness)
+    found = visible_integral(distance, soft.sharpness) / integral(soft.sharpness)
+    assert np.abs(found - mean).max() < 0.01
+    exact = visible_integral(distance, sharpness) / integral(sharpness)
+    assert np.abs(exact - mean).max() > 0.3
+
+
+def test_softened_lights_keep_their_flux_and_wide_ones_their_width() -> None:
+    lights = Lights(np.eye(3), np.array([3.0, 300.0, 1e5]), np.arange(9.0).reshape(3, 3))
+    soft = softened(lights, 0.006)
+    flux, before = (integral(one.sharpness)[:, None] * one.amplitudes for one in (soft, lights))
+    np.testing.assert_allclose(flux, before, rtol=1e-12)
+    assert soft.sharpness[0] > 2.99
+    assert soft.sharpness[2] < 1 / 0.012**2
+    np.testing.assert_allclose(softened(lights, 0.0).sharpness, lights.sharpness, rtol=1e-15)
+    with pytest.raises(ValueError, match="rmse is -0"):
+        softened(lights, -0.1)

@@ -6,6 +6,7 @@ const SUN_RADIUS = (0.2665 * Math.PI) / 180;
 const MOST_RADIUS = (3 * Math.PI) / 180;
 const EDGE = 0.05;
 const LEAST_SHARE = 0.003;
+const AT_EDGES = 2; // as of `light/spherical_gaussians.py`
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 
 /** A Gaussian of the width, place and flux of a sun. */
@@ -28,10 +29,22 @@ export function splitSuns({ height, data }: Environment, most: number): { suns: 
     found.texels.forEach((p, k) => {
       for (let channel = 0; channel < 3; channel++) rest[3 * p + channel] -= found.above[k][channel];
     });
-    const unit = (-2 * Math.PI * Math.expm1(-2 * found.sharpness)) / found.sharpness;
+    const unit = unitFlux(found.sharpness);
     suns.push({ axis: found.axis, sharpness: found.sharpness, amplitude: found.flux.map((value) => value / unit) });
   }
   return { suns, rest };
+}
+
+/** (N) and (N, 3): lights as distances with an error (radians) show them, each with its flux. */
+export function softened(sharpness: Float32Array, amplitudes: Float32Array, rmse: number) {
+  const soft = sharpness.map((sharp) => 1 / (1 / sharp + (AT_EDGES * rmse) ** 2));
+  const kept = soft.map((sharp, k) => unitFlux(sharpness[k]) / unitFlux(sharp));
+  return { sharpness: soft, amplitudes: amplitudes.map((value, k) => value * kept[Math.floor(k / 3)]) };
+}
+
+/** Integral over the sphere of a Gaussian of amplitude 1. */
+function unitFlux(sharpness: number): number {
+  return (-2 * Math.PI * Math.expm1(-2 * sharpness)) / sharpness;
 }
 
 function luminance(colour: ArrayLike<number>): number {
