@@ -16,7 +16,7 @@ from assets_defs.workspace import CHECKOUT
 from pipelines.light.built_in_environments import sky
 from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
-from pipelines.ssdf_lighting.compression.resident import halved
+from pipelines.ssdf_lighting.compression.resident import resampled
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
@@ -72,7 +72,7 @@ def _halved() -> dict[str, Any]:
     return {
         "halved_rows": rows.tolist(),
         "halved_root_weight": root_weights(256).tolist(),
-        "halved": halved(rows).tolist(),
+        "halved": resampled(rows, 8).tolist(),
     }
 
 
