@@ -308,7 +308,8 @@ class _Pictures:
 
     def _bit(self, keys: list[tuple[int, ...]], chosen: int) -> int:
         weights = self.mixing[chosen]
-        asked = [model.setdefault(key, [32768, 0]) for model, key in zip(self.models, keys, strict=True)]
+        both = zip(self.models, keys, strict=True)
+        asked = [model.setdefault(key, [32768, 0]) for model, key in both]
         answers = [stretch(chance >> 4) for chance, _ in asked]
         mixed = sum(a * w for a, w in zip(answers, weights, strict=True)) >> 16
         p = squash(min(max(mixed, -2047), 2047))
@@ -316,7 +317,7 @@ class _Pictures:
         error = 5 * (4096 * bit - (p >> 4))
         for k, (answer, pair) in enumerate(zip(answers, asked, strict=True)):
             weights[k] = min(max(weights[k] + (answer * error + 8192 >> 14), -262144), 262144)
-            pair[0] += (65535 * bit - pair[0]) * int(32768 / (pair[1] + 1.6)) >> 15
+            pair[0] += (65535 * bit - pair[0]) * (327680 // (10 * pair[1] + 16)) >> 15
             pair[1] = min(pair[1] + 1, 30)
         return bit
 

@@ -44,7 +44,7 @@ def mixing_tables() -> tuple[Whole, Whole, Whole]:
     places = (np.arange(4096) + 0.5) / 4096.0
     logit = np.clip(np.rint(256.0 * np.log(places / (1.0 - places))), -2047, 2047)
     chance = np.clip(np.rint(65536.0 / (1.0 + np.exp(-np.arange(-2047, 2048) / 256.0))), 32, 65504)
-    rates = np.floor(32768.0 / (np.arange(_FASTEST + 1) + 1.6))
+    rates = 327680 // (10 * np.arange(_FASTEST + 1) + 16)
     return logit.astype(np.int64), chance.astype(np.int64), rates.astype(np.int64)
 
 
