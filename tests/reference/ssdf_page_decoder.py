@@ -248,7 +248,7 @@ def _references(data: bytes, vertices: int) -> list[list[int]]:
         step = recent.pop(place - 1) if place else new.pop(0) if new else 0
         recent.insert(0, step)
         found.append(k // 3 - step)
-        if not 0 <= found[-1] < max(k // 3, 1) and k > 2 or k < 3 and found[-1] != -1:
+        if (not 0 <= found[-1] < max(k // 3, 1) and k > 2) or (k < 3 and found[-1] != -1):
             raise ValueError("a reference that cannot be")
     return [found[3 * v : 3 * v + 3] for v in range(vertices)]
 

@@ -40,7 +40,7 @@ _ROUNDING = 0.0012
 """Radians: RMS error of d that the rounding of one column may make."""
 _NIBBLE, _BYTE, _WORD = 7, 127, 32767
 """Largest codes of 4, 8 and 16 bits."""
-_WORTH = 0.004
+_WORTH = 0.035
 """Radians: the root of the squared error, in one direction of one vertex, that a byte is worth."""
 _ROUNDS = 16
 """Of conjugate gradients."""
