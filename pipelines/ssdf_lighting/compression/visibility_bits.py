@@ -129,7 +129,9 @@ def decode_references(code: bytes, count: int) -> Whole:
         raise ValueError("the file is damaged: it has more new steps than steps.")
     contexts = np.append(np.arange(wanted) % REFERENCES, np.full(new, REFERENCES))
     told = coder.decode(code[4:], contexts).tolist()
-    fresh, recent, steps = iter(told[wanted:]), [], []
+    fresh = iter(told[wanted:])
+    recent: list[int] = []
+    steps: list[int] = []
     for place in told[:wanted]:
         if not 0 <= place <= len(recent):
             raise ValueError("the file is damaged: a step is not in the list.")
@@ -170,7 +172,7 @@ def _pad(picture: Bits, padded: Bits, across: Bits, soft: Bits) -> None:
 @njit(cache=True, nogil=True, inline="always")
 def _nine(a: Bits, y: int, x: int) -> Any:
     """Nine bits around a place, row by row, the first the lowest."""
-    whole, place = 0, 0
+    whole, place = np.int64(0), 0
     for dy in range(-1, 2):
         for dx in range(-1, 2):
             whole |= np.int64(a[y + dy, x + dx]) << place
@@ -266,7 +268,7 @@ def _run(
                     sums[k] = soft[k, y, x]
                 _contexts_at(own, refs, y + 2, x + 2, sums, contexts)
                 before = np.int64(own[y + 2, x + 1]) ^ np.int64(own[y + 1, x + 2])
-                chosen = before + 2 * min(abs(np.int64(total[x]) - 24) >> 2, 6)
+                chosen = before + 2 * min(int(abs(np.int64(total[x]) - 24) >> 2), 6)
                 if total[x] == 0 or total[x] == 48:
                     chosen = _SURE
                 mixed = 0
