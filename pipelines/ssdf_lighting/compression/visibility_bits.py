@@ -270,7 +270,7 @@ def _run(
                 before = np.int64(own[y + 2, x + 1]) ^ np.int64(own[y + 1, x + 2])
                 chosen = before + 2 * min(int(abs(np.int64(total[x]) - 24) >> 2), 6)
                 if total[x] == 0 or total[x] == 48:
-                    chosen = _SURE
+                    chosen = np.int64(_SURE)
                 mixed = 0
                 for i in range(MODELS):
                     answers[i] = logit[models[i, contexts[i]] >> 4]
