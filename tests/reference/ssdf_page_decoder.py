@@ -195,3 +195,166 @@ def mismatches(numbers: Numbers, other: dict[str, np.ndarray]) -> int:
         size = min(len(own), len(found))
         wrong += int((own[:size] != found[:size]).sum()) + abs(len(own) - len(found))
     return wrong
+
+
+# ---- version 2: bits ---------------------------------------------------------------------------
+
+
+class SeenBits(NamedTuple):
+    """The numbers of a file of version 2: ``cluster`` (V,), ``bits`` (V, n, n)."""
+
+    n: int
+    cluster: list[int]
+    bits: list[list[list[int]]]
+
+
+def bits_of(data: bytes) -> SeenBits:
+    """All of a file of bits. Raises ValueError for what the page says is refused."""
+    if data[:8] != b"TSUYASDF" or len(data) < 28:
+        raise ValueError("no such file")
+    version, n, vertices, clusters, first, second = struct.unpack_from("<HHIIII", data, 8)
+    if version != 2:
+        raise ValueError("another version")
+    if n % 2 or n < 4 or not 0 < clusters <= vertices or vertices * n * n > 131072 * len(data):
+        raise ValueError("a header that cannot be")
+    code = _Code(data[28 : 28 + first])
+    front, cluster = list(range(clusters)), []
+    for _ in range(vertices):
+        place = code.number("cluster")
+        if not 0 <= place < clusters:
+            raise ValueError("a place that cannot be")
+        cluster.append(front.pop(place))
+        front.insert(0, cluster[-1])
+    code.end()
+    if len(set(cluster)) != clusters:
+        raise ValueError("a cluster without a vertex")
+    references = _references(data[28 + first : 28 + first + second], vertices)
+    return SeenBits(n, cluster, _Pictures(data[28 + first + second :], n).all(references))
+
+
+def _references(data: bytes, vertices: int) -> list[list[int]]:
+    (fresh,) = struct.unpack_from("<I", data)
+    if fresh > 3 * vertices:
+        raise ValueError("more new steps than steps")
+    code = _Code(data[4:])
+    places = [code.number(k % 3) for k in range(3 * vertices)]
+    new = [code.number("new") for _ in range(fresh)]
+    code.end()
+    recent: list[int] = []
+    found = []
+    for k, place in enumerate(places):
+        if not 0 <= place <= len(recent):
+            raise ValueError("a place that cannot be")
+        step = recent.pop(place - 1) if place else new.pop(0) if new else 0
+        recent.insert(0, step)
+        found.append(k // 3 - step)
+        if (not 0 <= found[-1] < max(k // 3, 1) and k > 2) or (k < 3 and found[-1] != -1):
+            raise ValueError("a reference that cannot be")
+    return [found[3 * v : 3 * v + 3] for v in range(vertices)]
+
+
+class _Pictures:
+    """The third code: bits, vertex by vertex."""
+
+    def __init__(self, data: bytes, n: int) -> None:
+        self.code = _Code(data)
+        self.n = n
+        self.models: list[dict[tuple[int, ...], list[int]]] = [{} for _ in range(6)]
+        self.mixing = [[16384] * 6 for _ in range(15)]
+        self.flags = [32768] * 32
+        self.done: list[list[list[int]]] = []
+
+    def all(self, references: list[list[int]]) -> list[list[list[int]]]:
+        blank = [[0] * self.n for _ in range(self.n)]
+        for own in references:
+            self.done.append(self._one([self.done[k] if k >= 0 else blank for k in own]))
+        self.code.end()
+        return self.done
+
+    def _one(self, near: list[list[list[int]]]) -> list[list[int]]:
+        n = self.n
+        base = 16 if not self.done else 0
+        own = [list(row) for row in near[0]]
+
+        def at(picture: list[list[int]], y: int, x: int) -> int:
+            return picture[min(max(y, 0), n - 1)][min(max(x, 0), n - 1)]
+
+        # Of the own picture, what lies beyond the border is the first reference's.
+        def mine(y: int, x: int) -> int:
+            return own[y][x] if 0 <= y < n and 0 <= x < n else at(near[0], y, x)
+
+        recent = 0
+        for y in range(n):
+            soft = [[sum((2 - abs(dy)) * (2 - abs(dx)) * at(picture, y + dy, x + dx)
+                         for dy in (-1, 0, 1) for dx in (-1, 0, 1)) for picture in near]
+                    for x in range(n)]  # fmt: skip
+            total = [sum(each) for each in soft]
+            active = sum(0 < each < 48 for each in total)
+            flag = base + 4 * recent + min(active, 3)
+            unlike = self.code._answer(65536 - self.flags[flag])
+            self.flags[flag] += (65535 * unlike - self.flags[flag]) * 800 >> 16
+            self.flags[flag] = min(max(self.flags[flag], LEAST), MOST)
+            recent = unlike + 2 * (recent & 1)
+            for x in range(n):
+                if 0 < total[x] < 48:
+                    chosen = (mine(y, x - 1) ^ mine(y - 1, x)) + 2 * min(abs(total[x] - 24) // 4, 6)
+                elif unlike:
+                    chosen = 14
+                else:
+                    own[y][x] = near[0][y][x]
+                    continue
+                own[y][x] = self._bit(_keys(mine, at, near, soft[x], y, x), chosen)
+        return own
+
+    def _bit(self, keys: list[tuple[int, ...]], chosen: int) -> int:
+        weights = self.mixing[chosen]
+        both = zip(self.models, keys, strict=True)
+        asked = [model.setdefault(key, [32768, 0]) for model, key in both]
+        answers = [stretch(chance >> 4) for chance, _ in asked]
+        mixed = sum(a * w for a, w in zip(answers, weights, strict=True)) >> 16
+        p = squash(min(max(mixed, -2047), 2047))
+        bit = self.code._answer(65536 - p)
+        error = 5 * (4096 * bit - (p >> 4))
+        for k, (answer, pair) in enumerate(zip(answers, asked, strict=True)):
+            weights[k] = min(max(weights[k] + (answer * error + 8192 >> 14), -262144), 262144)
+            pair[0] += (65535 * bit - pair[0]) * (327680 // (10 * pair[1] + 16)) >> 15
+            pair[1] = min(pair[1] + 1, 30)
+        return bit
+
+
+def stretch(place: int) -> int:
+    """The page's, of a chance in 4096."""
+    share = (place + 0.5) / 4096
+    return min(max(round(256 * math.log(share / (1 - share))), -2047), 2047)
+
+
+def squash(mixed: int) -> int:
+    """The page's: a chance in 65536."""
+    return min(max(round(65536 / (1 + math.exp(-mixed / 256))), LEAST), MOST)
+
+
+def _keys(
+    mine: Callable[[int, int], int],
+    at: Callable[..., int],
+    near: list[list[list[int]]],
+    soft: list[int],
+    y: int,
+    x: int,
+) -> list[tuple[int, ...]]:
+    before = tuple(mine(y + dy, x + dx) for dy, dx in ((0, -1), (-1, -1), (-1, 0), (-1, 1)))
+    far = tuple(mine(y + dy, x + dx) for dy, dx in ((0, -2), (-2, 0), (-2, 1), (-2, -1), (-1, 2)))
+    a, b, c = ([at(picture, y + dy, x + dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+               for picture in near)  # fmt: skip
+    wide = tuple(at(near[0], y + dy, x + dx) for dy, dx in ((-2, 0), (0, -2), (0, 2), (2, 0)))
+    return [
+        (*before, *far, *a[4:], b[4], b[7]),
+        (*before, *a, b[4], c[4]),
+        (*before, *b, a[4], c[4]),
+        (*before, *c, a[4], b[4]),
+        (*before, soft[0], soft[1]),
+        (before[0], before[2], *wide, *_cross(a), *_cross(b)),
+    ]
+
+
+def _cross(nine: list[int]) -> tuple[int, ...]:
+    return nine[1], nine[3], nine[4], nine[5], nine[7]

@@ -17,7 +17,7 @@ from pipelines.light.built_in_environments import sky
 from pipelines.light.environment_maps import texel_directions
 from pipelines.ssdf_lighting.compression.compact_file import compress, from_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
-from pipelines.ssdf_lighting.compression.resident import halved
+from pipelines.ssdf_lighting.compression.resident import resampled
 from pipelines.ssdf_lighting.distances.weighted_sphere import root_weights
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.stage_view import matt_rows
@@ -116,7 +116,7 @@ def _halved() -> dict[str, Any]:
     return {
         "halved_rows": rows.tolist(),
         "halved_root_weight": root_weights(256).tolist(),
-        "halved": halved(rows).tolist(),
+        "halved": resampled(rows, 8).tolist(),
     }
 
 

@@ -68,7 +68,7 @@ def to_bytes(compact: CompactCodes) -> bytes:
             compact.ranks,
             np.diff(compact.shared_level, prepend=0),
             _differences(compact.level, compact.ranks),
-            _moved_to_front(compact.cluster, count),
+            moved_to_front(compact.cluster, count),
         ]
     )
     first = encode(*small)
@@ -110,7 +110,7 @@ def from_bytes(data: bytes) -> CompactCodes:
     both = np.concatenate([shared_level, level])
     if ((both < 0) | (both > _LARGEST_LEVEL)).any():
         raise ValueError("the file is damaged: its levels are out of range.")
-    cluster = _moved_back(moved, count)
+    cluster = moved_back(moved, count)
     sizes = np.bincount(cluster, minlength=count)
     if (ranks * sizes).sum() != weights:
         raise ValueError("the file is damaged: its clusters do not add up.")
@@ -150,7 +150,7 @@ def _summed(steps: Codes, ranks: Codes) -> Codes:
 
 
 @njit(cache=True, nogil=True)
-def _moved_to_front(cluster: Codes, count: int) -> Codes:
+def moved_to_front(cluster: Codes, count: int) -> Codes:
     """Places in a list in which the last one used is the first."""
     recent = np.arange(count)
     moved = np.empty(len(cluster), np.int32)
@@ -165,7 +165,8 @@ def _moved_to_front(cluster: Codes, count: int) -> Codes:
 
 
 @njit(cache=True, nogil=True)
-def _moved_back(moved: Codes, count: int) -> Codes:
+def moved_back(moved: Codes, count: int) -> Codes:
+    """The inverse of `moved_to_front`."""
     recent = np.arange(count)
     cluster = np.empty(len(moved), np.int32)
     for k in range(len(moved)):

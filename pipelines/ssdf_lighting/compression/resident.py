@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.ssdf_lighting.compression.clustered_pca import ReadRows, gram_svd
 from pipelines.ssdf_lighting.compression.compact import (
     CompactCodes,
     cluster_vectors,
@@ -39,6 +40,8 @@ _ROUNDING = 0.0012
 """Radians: RMS error of d that the rounding of one column may make."""
 _NIBBLE, _BYTE, _WORD = 7, 127, 32767
 """Largest codes of 4, 8 and 16 bits."""
+_WORTH = 0.035
+"""Radians: the root of the squared error, in one direction of one vertex, that a byte is worth."""
 _ROUNDS = 16
 """Of conjugate gradients."""
 _LEAST_HALVED = 64
@@ -78,29 +81,59 @@ def resident_tables(compact: CompactCodes) -> ResidentTables:
     n = compact.resolution
     shared = shared_vectors(compact) / root_weights(n * n)
     if n >= _LEAST_HALVED:
-        shared = halved(shared)
+        shared = resampled(shared, n // 2)
     centres, vectors = cluster_vectors(compact)
-    sizes, order = compact.sizes, compact.vertices_in_order
-    parts: list[list[NDArray[np.integer]]] = [[], [], []]
-    counts, scales, weights = [], [], []
-    start = np.empty(len(order), np.uint32)
-    first, read, row, written = 0, 0, 0, 0
+    sizes = compact.sizes
+    columns, first, read = [], 0, 0
     for size, rank, centre in zip(sizes, compact.ranks, centres, strict=True):
         codes = compact.weights[read : read + size * rank].reshape(size, rank)
         own = np.concatenate([centre[None], vectors[first : first + rank]]).astype(np.float32)
-        made = _columns(own @ shared, codes * compact.step)
-        for part, found in zip(parts, made.codes, strict=True):
-            part.append(found.ravel())
-        counts.append(made.counts)
-        scales.append(made.scale)
-        weights.append(made.weights.ravel())
+        columns.append(_columns(own @ shared, codes * compact.step))
+        first, read = first + rank, read + size * rank
+    return _laid_out(columns, compact.cluster, resolution_of(shared.shape[1]))
+
+
+def resident_of_rows(
+    read: ReadRows, cluster: NDArray[np.integer], n: int, resolution: int
+) -> ResidentTables:
+    """Clustered PCA of d in n x n directions, made for drawing at once.
+
+    read: gives d (P, n²) float32, radians, of vertices (P,); called once a cluster, so the rows of
+    all never lie in memory together. ``cluster`` (V,) numbers without gaps. A vector is kept where
+    it takes off more squared error than its bytes are worth (`_WORTH`). ``resolution``, at most n,
+    is that of the tables.
+    """
+    root = root_weights(n * n)
+    columns = []
+    for number in range(int(cluster.max()) + 1):
+        rows = read(np.flatnonzero(cluster == number)).astype(np.float64)
+        centre = rows.mean(axis=0)
+        left, sigma, right = gram_svd(((rows - centre) * root).astype(np.float32))
+        kept = int((sigma**2 > _WORTH**2 * (resolution**2 + 2 * len(rows))).sum())
+        own = np.concatenate([centre[None], right[:kept] / root])
+        columns.append((own, left[:, :kept] * sigma[:kept]))
+    fitted = np.concatenate([own for own, _ in columns])
+    if resolution < n:
+        fitted = resampled(fitted, resolution)
+    parts = np.split(fitted, np.cumsum([len(own) for own, _ in columns])[:-1])
+    return _laid_out(
+        [_columns(own, weights) for own, (_, weights) in zip(parts, columns, strict=True)],
+        cluster,
+        resolution,
+    )
+
+
+def _laid_out(
+    columns: list[_Columns], cluster: NDArray[np.integer], resolution: int
+) -> ResidentTables:
+    """The tables of clusters' columns, whose weights are those of their vertices, ascending."""
+    sizes, order = np.bincount(cluster, minlength=len(columns)), np.argsort(cluster, kind="stable")
+    start, row, written = np.empty(len(order), np.uint32), 0, 0
+    for size, made in zip(sizes, columns, strict=True):
+        rank = made.weights.shape[1]
         start[order[row : row + size]] = written + rank * np.arange(size)
-        first, read, row, written = (
-            first + rank,
-            read + size * rank,
-            row + size,
-            written + size * rank,
-        )
+        row, written = row + size, written + size * rank
+    parts = [[made.codes[kind].ravel() for made in columns] for kind in range(3)]
     lengths = [[len(each) for each in part] for part in parts]
     words, whole, nibbles = (np.concatenate(part) for part in parts)
     return ResidentTables(
@@ -108,13 +141,13 @@ def resident_tables(compact: CompactCodes) -> ResidentTables:
         whole.astype(np.int8, copy=False),
         nibbles.astype(np.uint8, copy=False),
         np.stack([np.cumsum(each) - each for each in lengths], axis=1).astype(np.uint32),
-        np.array(counts, np.uint16),
-        np.concatenate(scales).astype(np.float32),
-        np.cumsum([0, *(len(each) for each in scales[:-1])]).astype(np.uint32),
-        np.concatenate(weights).astype(np.int16),
+        np.array([made.counts for made in columns], np.uint16),
+        np.concatenate([made.scale for made in columns]).astype(np.float32),
+        np.cumsum([0, *(len(made.scale) for made in columns[:-1])]).astype(np.uint32),
+        np.concatenate([made.weights.ravel() for made in columns]).astype(np.int16),
         start,
-        compact.cluster.astype(np.uint16 if len(sizes) <= 1 << 16 else np.uint32),
-        resolution_of(shared.shape[1]),
+        cluster.astype(np.uint16 if len(columns) <= 1 << 16 else np.uint32),
+        resolution,
     )
 
 
@@ -155,21 +188,21 @@ def _columns(rows: Floats, weights: NDArray[np.floating]) -> _Columns:
     )
 
 
-# ---- half the resolution -----------------------------------------------------------------------
+# ---- fewer directions --------------------------------------------------------------------------
 
 
-def halved(rows: NDArray[np.floating]) -> Floats:
-    """Values (P, (n/2)²) float32 whose bilinear interpolation at n x n directions is nearest to
-    rows (P, n²), by solid angle.
+def resampled(rows: NDArray[np.floating], m: int) -> Floats:
+    """Values (P, m²) float32 whose bilinear interpolation at n x n directions is nearest to
+    rows (P, n²), by solid angle; m is less than n.
 
     Normal equations by conjugate gradients with their diagonal as preconditioner.
 
     >>> import numpy as np
-    >>> bool(np.allclose(halved(np.full((1, 64), 0.5)), 0.5, atol=1e-4))
+    >>> bool(np.allclose(resampled(np.full((1, 64), 0.5), 4), 0.5, atol=1e-4))
     True
     """
     n = resolution_of(rows.shape[1])
-    taps, areas = _half_taps(n), solid_angles(n)[:, None]
+    taps, areas = _taps(n, m), solid_angles(n)[:, None]
     weighted = taps.T * areas.T
     diagonal = (taps.multiply(taps)).T @ areas
     values = np.zeros((taps.shape[1], len(rows)))
@@ -188,11 +221,11 @@ def halved(rows: NDArray[np.floating]) -> Floats:
 
 
 @functools.lru_cache(maxsize=4)
-def _half_taps(n: int) -> csr_array:
-    """(n², (n/2)²): bilinear interpolation from half the rows and columns."""
+def _taps(n: int, m: int) -> csr_array:
+    """(n², m²): bilinear interpolation from fewer rows and columns."""
     from scipy.sparse import csr_array
 
-    found = bilinear_taps(texel_directions(n), n // 2)
+    found = bilinear_taps(texel_directions(n), m)
     rows = np.repeat(np.arange(n * n), 4)
     places = (rows, found.texels.ravel())
-    return csr_array((found.weights.ravel(), places), shape=(n * n, (n // 2) ** 2))
+    return csr_array((found.weights.ravel(), places), shape=(n * n, m * m))

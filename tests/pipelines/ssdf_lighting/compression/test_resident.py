@@ -31,7 +31,7 @@ def file() -> bytes:
 
 def test_halving_is_the_least_squares_solution() -> None:
     rows = np.random.default_rng(0).standard_normal((5, N * N)).astype(np.float32)
-    found = resident.halved(rows)
+    found = resident.resampled(rows, N // 2)
     taps = bilinear_taps(texel_directions(N), N // 2)
     matrix = np.zeros((N * N, (N // 2) ** 2))
     np.add.at(matrix, (np.arange(N * N)[:, None], taps.texels), taps.weights)
