@@ -215,7 +215,7 @@ def test_a_clear_plate_cannot_be_seen_in_even_light(pane: Solid, degrees: float)
 
 
 def test_a_plate_shows_what_lies_straight_behind_it(pane: Solid) -> None:
-    """Each of many small lights, as they are looked at: a slab bends light back to where it went."""
+    """Each of many small lights, as it is looked at: a slab bends light back to where it went."""
     radiance = np.random.default_rng(2).random((16, 32, 3)).astype(np.float32)
     light, clean = make_environment_sampler(radiance), surface(CLEAN)
     for degrees in (13.0, -33.0, 52.0):
