@@ -25,6 +25,7 @@ from pipelines.glass_scratches.tables.monte_carlo import PLACES
 from pipelines.glass_scratches.tables.random_numbers import next_number
 
 _BOUNCES = 10_000
+_MOST_GROOVES = 100_000
 _KEPT, _LOST = -1, -2
 
 
@@ -201,28 +202,24 @@ def _hit(walls, at):  # type: ignore[no-untyped-def]
     """The groove and the piece that a path meets next, and how far along; piece -1 for none."""
     grooves = len(walls.x)
     if not at.in_glass:  # a groove's air ends at its own walls
-        distance, piece, along = _hit_in(walls, at, at.groove, 0.0, at.piece)
+        _, piece, along = _hit_in(walls, at, at.groove, 0.0, at.piece)
         return at.groove, piece, along
-    centre = 0
+    # From groove to groove, each within its own width, until the path is below all of them.
+    beside = 0
     step = 1 if at.dx > 0.0 else -1
-    for _ in range(100_000):
-        nearest, found, where, there = np.inf, -1, 0.0, at.groove
-        for beside in range(centre - 1, centre + 2):
-            groove = (at.groove + beside) % grooves
-            skip = at.piece if beside == 0 else -1
-            distance, piece, along = _hit_in(walls, at, groove, float(beside), skip)
-            if distance < nearest:
-                nearest, found, where, there = distance, piece, along, groove
-        if found >= 0:
-            return there, found, where
-        # Nothing near: on to the next grooves, until the path is below all of them.
-        border = float(centre + 1) if step > 0 else float(centre)
+    for _ in range(_MOST_GROOVES):
+        groove = (at.groove + beside) % grooves
+        skip = at.piece if beside == 0 else -1
+        _, piece, along = _hit_in(walls, at, groove, float(beside), skip)
+        if piece >= 0:
+            return groove, piece, along
         if at.dx == 0.0:
             return at.groove, -1, 0.0
+        border = float(beside + 1) if step > 0 else float(beside)
         height = at.y + at.dy * (border - at.x) / at.dx
         if height < walls.lowest or height > 0.0:
             return at.groove, -1, 0.0
-        centre += step
+        beside += step
     return at.groove, -1, 0.0
 
 
