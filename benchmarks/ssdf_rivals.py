@@ -2,10 +2,10 @@
 
 Bytes of the file and of what stays while a scene is drawn, seconds to decode, multiplications a
 look-up, PSNR of relit pictures and of irradiance, frames a second. The rivals: the bits of
-visibility without loss (`ssdf_visibility_coding`), summed as they are and as distances rebuilt from
-them; one PCA; a basis that moves along the mesh; spherical harmonics of visibility times cosine.
-All are quantised by the search for one step and coded by the same coder; the last three get the
-bytes of ours. The null is a hemisphere without shadows.
+visibility without loss (`compression.visibility_bits`), summed as they are and as distances rebuilt
+from them; one PCA; a basis that moves along the mesh; spherical harmonics of visibility times
+cosine. All are quantised by the search for one step and coded by the same coder; the last three get
+the bytes of ours. The null is a hemisphere without shadows.
 
 Irradiance is judged at vertices and inside triangles, under spherical Gaussians of several
 sharpnesses, against many rays; errors are shares of what a surface facing the light would get.
@@ -24,8 +24,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from assets_defs.ssdf_lighting.datasets import scene_of, shared_basis_of, visible_of
-from benchmarks.ssdf_rebuilt import rebuilt_distances
-from benchmarks.ssdf_visibility_coding import decode_visibility, encode_visibility
 from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.compression import compact as coding
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes, to_bytes
@@ -34,7 +32,12 @@ from pipelines.ssdf_lighting.compression.entropy_coding import decode, encode
 from pipelines.ssdf_lighting.compression.lookup import matrix_along
 from pipelines.ssdf_lighting.compression.resident import resident_tables
 from pipelines.ssdf_lighting.compression.triangle_clusters import clusters_by_position
+from pipelines.ssdf_lighting.compression.visibility_bits import (
+    decode_visibility,
+    encode_visibility,
+)
 from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
+from pipelines.ssdf_lighting.distances.rebuilt import rebuilt_distances
 from pipelines.ssdf_lighting.distances.visibility import LIFT, RayOrigins, visible_directions
 from pipelines.ssdf_lighting.drawing.frames import DistancesAlong
 from pipelines.ssdf_lighting.light.cosine_lobes import cosine_lobes
@@ -42,6 +45,8 @@ from pipelines.ssdf_lighting.light.spherical_gaussians import visible_share, vis
 
 FloatArray = NDArray[np.float64]
 
+_REBUILT = 512
+"""Vertices whose distances are rebuilt at a time."""
 _POINTS = 160
 """Vertices, and as many points inside triangles, whose irradiance is judged."""
 _FINE = 3
@@ -203,25 +208,27 @@ class _Rows:
 
     def bits(self) -> dict[str, dict[str, Any]]:
         """The bits of visibility, without loss: summed, and as distances rebuilt from them."""
-        code = encode_visibility(self.visible, self.scene.triangles)
+        codes = encode_visibility(self.visible, self.scene.triangles)
+        count, n = len(self.visible), math.isqrt(self.visible.shape[1])
         begin = time.perf_counter()
-        found = decode_visibility(code)
+        found = decode_visibility(*codes, count, n)
         seconds = time.perf_counter() - begin
         if not np.array_equal(found, self.visible):
             raise ValueError("the bits of visibility: decoded they are others than before.")
-        matrix = rebuilt_distances(found)
+        blocks = range(0, count, _REBUILT)
+        matrix = np.concatenate([rebuilt_distances(found[k : k + _REBUILT]) for k in blocks])
         rebuilt = time.perf_counter() - begin
         along = functools.partial(matrix_along, matrix)
         return {
             "bits": {
-                "file_bytes": len(code),
+                "file_bytes": sum(map(len, codes)),
                 "resident_bytes": self.visible.size // 8,
                 "decode_s": seconds,
                 "multiplications": float(self.visible.shape[1]),
                 "irradiance_db": bits_db(self.judged, found),
             },
             "bits_as_distances": {
-                "file_bytes": len(code),
+                "file_bytes": sum(map(len, codes)),
                 "resident_bytes": matrix.nbytes,
                 "decode_s": rebuilt,
                 "multiplications": 4.0,

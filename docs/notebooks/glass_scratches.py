@@ -11,14 +11,15 @@ from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches import scratched_glass as glass
 from pipelines.glass_scratches.drawing import denoising, frames
 from pipelines.glass_scratches.layers import scratch_layers, settings
-from pipelines.glass_scratches.tables import profiles, scratch_table
+from pipelines.glass_scratches.tables import glass_table, profiles
 from pipelines.light import environment_sampling, room
 
-# %% [markdown]
-# A V with diffuse walls, 10 µm wide and 4 deep; four layers of such scratches; a plate with them.
+# %% [markdown] A V in glass, its walls scatter evenly, 10 µm wide and 4 deep; four layers of such
+# scratches; a plate with them.
 
 # %%
-table = scratch_table.scratch_brdf_table(profiles.built_in_profile("v", 10.0, 4.0), bins=64)
+groove = profiles.built_in_profile("v", 10.0, 4.0)
+table = glass_table.glass_table(groove, bins=64, index=1.5)
 layers = scratch_layers.make_layers(settings.LayerSpec(length=0.6, width=0.01), seed=3)
 pane = glass.scratched_glass(plate(1.5, 1.1, 0.05), glass.scratch_material(table, layers))
 

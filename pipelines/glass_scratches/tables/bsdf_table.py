@@ -27,7 +27,8 @@ class BsdfTable(NamedTuple):
     for; ``absorbed`` (S, 2 M) float64: part of a beam that walls keep; ``across`` (S, places, 2 M
     view, 2 M light) float32: rho by the place where the view's ray crosses the opening, from its
     left end, the mean of which is rho; ``leans`` (S,) float64, rising; ``keeps``: whether walls
-    keep the lean: the last table, of lean 1, is then that from 1 on; ``index`` of refraction.
+    keep the lean: the last table, of lean 1, is then that from 1 on; ``refractive_index`` of the
+    glass.
     """
 
     rho: NDArray[np.float64]

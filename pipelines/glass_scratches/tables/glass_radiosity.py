@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from pipelines.glass_scratches.tables.bins import bin_centres, bin_weights
 from pipelines.glass_scratches.tables.facets import facet_ends
 from pipelines.glass_scratches.tables.fresnel import check_refractive_index
+from pipelines.glass_scratches.tables.groove_walls import check_within_opening
 from pipelines.glass_scratches.tables.radiosity import (
     ViewFactors,
     facets_along,
@@ -55,7 +56,11 @@ class EvenlyScattered(NamedTuple):
 
 
 def factors_of_both_sides(profile: NDArray[np.float64], bins: int, facets: int) -> BothSides:
-    """Factors of a profile (P, 2) between its crests, and of the glass between it and the next."""
+    """Factors of a profile (P, 2) between its crests, and of the glass between it and the next.
+
+    Raises ValueError as `check_within_opening`.
+    """
+    check_within_opening(profile)
     low = int(np.argmin(profile[:, 1]))
     width = profile[-1, 0] - profile[0, 0]
     ends = facet_ends(profile, facets)

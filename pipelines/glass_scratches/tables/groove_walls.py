@@ -43,7 +43,8 @@ def groove_walls(profile: NDArray[np.float64], slope: float = 0.0, seed: int = 0
     """Walls of a profile (P, 2) between its crests; width 1.
 
     ``slope``: standard deviation of the slope of the ridges of ground walls, 0 for smooth ones.
-    Raises ValueError for a negative slope, and where ridges as steep would cross in this profile.
+    Raises ValueError for a negative slope, where ridges as steep would cross in this profile, and
+    as `check_within_opening`.
 
     >>> from pipelines.glass_scratches.tables.profiles import built_in_profile
     >>> groove_walls(built_in_profile("v", 10.0, 4.0)).length.round(3).tolist()
@@ -51,6 +52,7 @@ def groove_walls(profile: NDArray[np.float64], slope: float = 0.0, seed: int = 0
     """
     if not (np.isfinite(slope) and slope >= 0.0):
         raise ValueError(f"slope of the walls is {slope:g}; expected 0 or more.")
+    check_within_opening(profile)
     width = float(profile[-1, 0] - profile[0, 0])
     shape = (profile - profile[0]) / width
     grooves = [shape] if slope == 0.0 else _ground(shape, slope, np.random.default_rng(seed))
@@ -67,6 +69,17 @@ def groove_walls(profile: NDArray[np.float64], slope: float = 0.0, seed: int = 0
         1.0,
         float(points[..., 1].min()),
     )
+
+
+def check_within_opening(profile: NDArray[np.float64]) -> None:
+    """Raises ValueError for a profile (P, 2) that is wider below than its opening: side by side
+    such grooves would run into each other."""
+    slack = 1e-9 * (profile[-1, 0] - profile[0, 0])
+    if profile[:, 0].min() < profile[0, 0] - slack or profile[:, 0].max() > profile[-1, 0] + slack:
+        raise ValueError(
+            "the profile is wider below than its opening; expected nothing beyond its ends in glass, "
+            "or the paper's walls (walls=paper)."
+        )
 
 
 def groove_points(walls: GrooveWalls) -> NDArray[np.float64]:

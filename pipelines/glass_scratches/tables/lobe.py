@@ -29,8 +29,8 @@ class Lobe(NamedTuple):
     the light's bins, from 0 to 1; ``share`` (S, places, 2 M) float32: part of the light that
     leaves; ``weights`` (S, 2 M): rho times these is the part that goes into a bin; ``leans`` (S,);
     ``keeps``: whether walls keep the lean (the last table is then that from a lean of 1 on);
-    ``sines`` (M + 1,) of the bins' borders; ``index``, of refraction; ``blur``: deviation of the
-    lean where it is kept.
+    ``sines`` (M + 1,) of the bins' borders; ``refractive_index`` of the glass; ``blur``: deviation
+    of the lean where it is kept.
     """
 
     rho: NDArray[np.float32]
