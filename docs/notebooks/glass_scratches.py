@@ -18,8 +18,7 @@ from pipelines.light import environment_sampling, room
 # scratches; a plate with them.
 
 # %%
-groove = profiles.built_in_profile("v", 10.0, 4.0)
-table = glass_table.glass_table(groove, bins=64, index=1.5)
+table = glass_table.glass_table(profiles.built_in_profile("v", 10, 4), bins=64, index=1.5)
 layers = scratch_layers.make_layers(settings.LayerSpec(length=0.6, width=0.01), seed=3)
 pane = glass.scratched_glass(plate(1.5, 1.1, 0.05), glass.scratch_material(table, layers))
 

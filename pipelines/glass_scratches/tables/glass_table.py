@@ -61,6 +61,7 @@ def glass_table(
     >>> even = glass_table(built_in_profile("v", 10.0, 4.0), bins=8, index=1.5, facets=20)
     >>> even.rho.shape, even.leans.tolist()
     ((1, 16, 16), [0.0])
+    >>> from pipelines.glass_scratches.tables.bsdf_table import beam_shares
     >>> bool(np.allclose(beam_shares(even), 1.0))  # all light goes on, on one side or the other
     True
     """

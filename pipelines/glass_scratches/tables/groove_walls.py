@@ -77,8 +77,8 @@ def check_within_opening(profile: NDArray[np.float64]) -> None:
     slack = 1e-9 * (profile[-1, 0] - profile[0, 0])
     if profile[:, 0].min() < profile[0, 0] - slack or profile[:, 0].max() > profile[-1, 0] + slack:
         raise ValueError(
-            "the profile is wider below than its opening; expected nothing beyond its ends in glass, "
-            "or the paper's walls (walls=paper)."
+            "the profile is wider below than its opening; expected nothing beyond its ends, or "
+            "the paper's walls (walls=paper)."
         )
 
 
