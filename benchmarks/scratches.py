@@ -47,7 +47,7 @@ RENDER_SIZE, RENDER_SAMPLES = 512, 64
 
 def run(scale: str) -> dict[str, Any]:
     """All figures; docs/scratches.md says what each one means. The paper's scale is that of
-    `scratches_pictures` alone."""
+    `scratches_pictures` and `scratches_glass`."""
     figures: dict[str, Any] = {}
     parts = (
         _laws,
@@ -59,7 +59,7 @@ def run(scale: str) -> dict[str, Any]:
     )
     for part in parts:
         figures |= part()
-    figures |= picture_figures(_material(), scale) | glass_figures()
+    figures |= picture_figures(_material(), scale) | glass_figures(scale)
     from tests.reference.groove import reference_figures
 
     return figures | reference_figures()

@@ -1,9 +1,14 @@
 """Figures of walls of glass: laws of the table, Mitsuba's grooves, what table and profile do to
-pictures, and the stage beside traced pictures."""
+pictures, and the stage beside traced pictures.
+
+At the paper's scale there are as many pairs of directions, and paths a pixel, as the figures ask
+for: the better part of an hour. Else fewer, and the names of what is measured with fewer end in
+``_small``.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,16 +45,35 @@ SETTINGS = {
 WALLS = {"even": 1.0, "ground": 0.5, "clear": 0.0}
 """Roughness."""
 SHAPES: tuple[Shape, ...] = ("v", "u", "trapezoid", "raised")
-MATTERS_SIZE, MATTERS_SAMPLES = 80, 128
-STAGE_SIZE, STAGE_SAMPLES = 180, 256
+MATTERS_SIZE = 80
 
 
-def glass_figures() -> dict[str, Any]:
+class Extent(NamedTuple):
+    """Pairs of directions to each side, of clear and of ground walls each; paths a pixel of what
+    tells whether tables matter; pixels a side and paths of the pictures that the stage is beside.
+    """
+
+    pairs: int
+    matters: int
+    stage: tuple[int, int]
+
+
+EXTENTS = {"default": Extent(40, 64, (128, 96)), "paper": Extent(160, 512, (180, 256))}
+
+
+def glass_figures(scale: str) -> dict[str, Any]:
     """All of them; docs/scratches.md says what each one means."""
     from tests.reference.glass_groove import reference_figures
 
     light = make_environment_sampler(room(1024))
-    return _laws() | _matters(light) | _stage_beside_traced(light) | reference_figures()
+    extent = EXTENTS[scale]
+    counted = (
+        _matters(light, extent.matters)
+        | _stage_beside_traced(light, extent.stage)
+        | reference_figures(extent.pairs)
+    )
+    end = "" if scale == "paper" else "_small"
+    return _laws() | {f"{name}{end}": value for name, value in counted.items()}
 
 
 def _table(shape: Shape, roughness: float, bins: int = BINS) -> BsdfTable:
@@ -70,7 +94,7 @@ def _laws() -> dict[str, float]:
     }
 
 
-def _matters(light: EnvironmentSampler) -> dict[str, Any]:
+def _matters(light: EnvironmentSampler, samples: int) -> dict[str, Any]:
     """Relative change of the pixels that show scratches, plate from close, where the table is set
     to zero and where the V becomes a trapezoid: RMS over mean, less what noise makes of it; beside
     it the same from one seed to another, which knows of no change."""
@@ -82,9 +106,9 @@ def _matters(light: EnvironmentSampler) -> dict[str, Any]:
             table = _table("v", roughness)
             black = table._replace(rho=0 * table.rho, across=0 * table.across)
             others = {"table": black, "profile": _table("trapezoid", roughness), "noise": table}
-            shown = _close_up(solid, table, layers, light, 0)
+            shown = _close_up(solid, table, layers, light, samples=samples, seed=0)
             for name, other in others.items():
-                changed = _close_up(solid, other, layers, light, 1)
+                changed = _close_up(solid, other, layers, light, samples=samples, seed=1)
                 found[name][f"{setting}_{walls}"] = _change(shown, changed)
     return {
         "table_matters": min(found["table"].values()),
@@ -95,7 +119,13 @@ def _matters(light: EnvironmentSampler) -> dict[str, Any]:
 
 
 def _close_up(
-    solid: Solid, table: BsdfTable, layers: Any, light: EnvironmentSampler, seed: int
+    solid: Solid,
+    table: BsdfTable,
+    layers: Any,
+    light: EnvironmentSampler,
+    *,
+    samples: int,
+    seed: int,
 ) -> TracedPicture:
     glass = scratched_glass(solid, scratch_material(table, layers))
     return trace_view(
@@ -103,7 +133,7 @@ def _close_up(
         light,
         object_cameras(solid)[1],
         size=MATTERS_SIZE,
-        samples=MATTERS_SAMPLES,
+        samples=samples,
         seed=seed,
     )
 
@@ -119,7 +149,7 @@ def _change(one: TracedPicture, other: TracedPicture) -> float:
     return float(np.sqrt(max(square, 0.0)) / (weight @ a / weight.sum()))
 
 
-def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
+def _stage_beside_traced(light: EnvironmentSampler, extent: tuple[int, int]) -> dict[str, Any]:
     """FLIP of the stage's pictures against traced and denoised ones: plate and teapot, far and
     close, walls of each kind; null: the stage's picture moved by half its width."""
     layers = make_layers(SETTINGS["setting_2"], 3)
@@ -131,7 +161,7 @@ def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
         for name, solid in solids.items():
             glass = scratched_glass(solid, material)
             for view in range(2):
-                one, null = _flips(glass, light, view)
+                one, null = _flips(glass, light, view, extent)
                 key = f"{name}_{'far' if view == 0 else 'close'}_{walls}"
                 flips[key], nulls[key] = one, null
     return {
@@ -142,13 +172,16 @@ def _stage_beside_traced(light: EnvironmentSampler) -> dict[str, Any]:
     }
 
 
-def _flips(glass: ScratchedGlass, light: EnvironmentSampler, view: int) -> tuple[float, float]:
+def _flips(
+    glass: ScratchedGlass, light: EnvironmentSampler, view: int, extent: tuple[int, int]
+) -> tuple[float, float]:
+    size, samples = extent
     camera = object_cameras(glass.solid)[view]
-    traced = denoised(trace_view(glass, light, camera, size=STAGE_SIZE, samples=STAGE_SAMPLES))
-    stage = draw_scratched(
-        glass.actor, light, camera, width=STAGE_SIZE, height=STAGE_SIZE, supersampling=2
-    )[..., :3]
-    empty = np.roll(stage, STAGE_SIZE // 2, axis=1)
+    traced = denoised(trace_view(glass, light, camera, size=size, samples=samples))
+    stage = draw_scratched(glass.actor, light, camera, width=size, height=size, supersampling=2)[
+        ..., :3
+    ]
+    empty = np.roll(stage, size // 2, axis=1)
     exposure = picture_exposure(traced)
 
     truth, one, null = (to_8bit(each * exposure) for each in (traced, stage, empty))

@@ -32,8 +32,8 @@ BAND = 4
 LEAST = 0.05
 """Part of a beam that a band gets at least, to be compared."""
 _SHARP = 0.2
-"""Part of a band's light in the bins at its borders, at most: a beam that the border of a band cuts
-is measured badly."""
+"""Part of a band's light in the bins at its borders, at most, of clear walls: a beam that the border
+of a band cuts is measured badly. Ground walls have no beams so narrow."""
 PATHS = 1 << 17
 _PARTS = 128
 """Of a view's bin, which is looked at from a direction drawn at random in each of them."""
@@ -69,7 +69,8 @@ class Compared(NamedTuple):
 def compare(profile: NDArray[np.float64], slope: float, count: int, seed: int) -> list[Compared]:
     """``count`` pairs of each of outside and inside light, for walls of this slope (0: clear).
 
-    Which bins are compared is drawn at random, among those whose band gets 2 % or more.
+    Which bins are compared is drawn at random, among those whose band gets
+    ``LEAST`` or more.
     """
     rng = np.random.default_rng(seed)
     walls = groove_walls(profile, slope, seed)
@@ -85,7 +86,8 @@ def compare(profile: NDArray[np.float64], slope: float, count: int, seed: int) -
             first
             for side in (0, BINS)
             for first in range(side, side + BINS - BAND + 1)
-            if _can_be_compared(beams[:, view], first) and wanted[side > 0] > 0
+            if _can_be_compared(beams[:, view], first, _SHARP if slope == 0 else 1.0)
+            and wanted[side > 0] > 0
         ]
         chosen = _apart(rng.permutation(bands).tolist())
         if not chosen:
@@ -102,9 +104,9 @@ def compare(profile: NDArray[np.float64], slope: float, count: int, seed: int) -
     return found
 
 
-def _can_be_compared(beam: NDArray[np.float64], first: int) -> bool:
+def _can_be_compared(beam: NDArray[np.float64], first: int, at_borders: float) -> bool:
     band = beam[first : first + BAND]
-    return bool(LEAST <= band.sum() <= 0.98 and band[0] + band[-1] <= _SHARP * band.sum())
+    return bool(LEAST <= band.sum() <= 0.98 and band[0] + band[-1] <= at_borders * band.sum())
 
 
 def _apart(bands: list[int]) -> list[int]:
