@@ -66,14 +66,24 @@ def smooth_radiance_from_direction(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill_radiance(radiance: Radiance, directions: FloatArray, found: Radiance) -> None:
+def _fill_radiance(
+    radiance: Radiance, directions: FloatArray, smooth: bool, found: Radiance
+) -> None:
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
-        found[i, 0], found[i, 1], found[i, 2] = radiance_from_direction(radiance, x, y, z)
+        if smooth:
+            found[i, 0], found[i, 1], found[i, 2] = smooth_radiance_from_direction(
+                radiance, x, y, z
+            )
+        else:
+            found[i, 0], found[i, 1], found[i, 2] = radiance_from_direction(radiance, x, y, z)
 
 
-def radiance_from_directions(radiance: Radiance, directions: ArrayLike) -> Radiance:
-    """Radiance (N, 3) float32 from directions (N, 3), which need not be unit vectors.
+def radiance_from_directions(
+    radiance: Radiance, directions: ArrayLike, *, smooth: bool = False
+) -> Radiance:
+    """Radiance (N, 3) float32 from directions (N, 3), which need not be unit vectors: of the texels
+    that hold them, or, ``smooth``, linear between the texels' middles, to be looked at.
 
     Raises ValueError for another shape of the directions and for a map that is not (H, 2 H, 3).
     """
@@ -81,7 +91,7 @@ def radiance_from_directions(radiance: Radiance, directions: ArrayLike) -> Radia
     if radiance.ndim != 3 or radiance.shape[1:] != (2 * len(radiance), 3) or not len(radiance):
         raise ValueError(f"environment: found shape {radiance.shape}, expected (H, 2 H, 3).")
     found = np.empty((len(ways), 3), np.float32)
-    _fill_radiance(radiance, ways, found)
+    _fill_radiance(radiance, ways, smooth, found)
     return found
 
 

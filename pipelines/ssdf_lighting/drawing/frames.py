@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
+from pipelines.light.environment_lookup import radiance_from_directions
 from pipelines.ssdf_lighting.drawing.bounced_light import BouncedLight
+from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.drawing.light_sources import LightSource, ProbeSource
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
@@ -105,7 +108,7 @@ def traced_reference(
 
 class RelitFrames(NamedTuple):
     """A scene under turning light with what it is compared with, 8-bit sRGB (…, H, W, 3) at one
-    exposure.
+    exposure, before the environment that lights it.
 
     frames: (frames, H, W, 3), with light that surfaces reflect.
     uncompressed, direct, reference: the first of them of the SSDFs before compression; without
@@ -170,16 +173,36 @@ def relit_frames(
         samples,
         progress=lambda fraction: progress(0.4 + 0.6 * fraction),
     ).radiance
+    behind = np.stack([seen_behind(light.environment, camera, size, turn) for turn in turns])
+    plain = np.array(BACKGROUND, np.float32)
     scale = scene_exposure(turning)
-    backdrop = turning.radiance[0] * (reference[..., 3:] == 0)
+
+    def shown(found: TurningLight, backdrops: NDArray[np.float32]) -> NDArray[np.uint8]:
+        free = 1.0 - found.covered[..., None]
+        return exposed(found.radiance + free * (backdrops - plain), scale)
+
     return RelitFrames(
-        exposed(turning.radiance, scale),
-        exposed(exact.radiance[0], scale),
-        exposed(direct.radiance[0], scale),
-        exposed(reference[..., :3] + backdrop, scale),
+        shown(turning, behind),
+        shown(exact, behind[:1])[0],
+        shown(direct, behind[:1])[0],
+        exposed(reference[..., :3] + behind[0] * (reference[..., 3:] == 0), scale),
         scale,
         turning,
     )
+
+
+def seen_behind(
+    environment: NDArray[np.floating], camera: Camera, size: tuple[int, int], turn: float
+) -> NDArray[np.float32]:
+    """Radiance (height, width, 3) of what stands behind a scene: an environment (H, 2 H, 3) turned
+    by degrees about up, as its lights are."""
+    _, ways = camera_rays(camera, size, pixel_centres(size))
+    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    found = radiance_from_directions(
+        np.ascontiguousarray(environment, np.float32), ways @ back.T, smooth=True
+    )
+    return found.reshape(size[1], size[0], 3)
 
 
 def cluster_picture(
