@@ -190,7 +190,7 @@ def clusters_of(triangle_clusters: xr.Dataset) -> Clusters:
 
 
 def dense_clusters(triangle_clusters: xr.Dataset) -> NDArray[np.int32]:
-    """Numbers of vertices' clusters (V,) without gaps: a cluster of triangles may have no vertex."""
+    """Numbers of vertices' clusters (V,), without gaps: some clusters may have no vertex."""
     import numpy as np
 
     _, dense = np.unique(triangle_clusters["vertex_cluster"].values, return_inverse=True)
