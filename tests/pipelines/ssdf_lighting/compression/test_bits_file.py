@@ -161,11 +161,11 @@ def test_a_decoder_reads_either_version_and_draws_what_it_tells(coded: CodedBits
     rows = decoder.distances(every)
     np.testing.assert_allclose(decoder.distances_along(every, axes), rows, atol=1e-4)
     exact = under_a_ball(n)
-    assert np.sqrt(((rows - exact) ** 2).mean()) < 0.04
+    assert np.sqrt(((rows - exact) ** 2).mean()) < 0.06
     assert np.sqrt(((rows[1:] - exact[:-1]) ** 2).mean()) > 0.1  # a null: the vertex before
     # Other directions than the file's lie between its own.
     finer = decoder.distances_in(every, 24)
-    assert np.sqrt(((finer - under_a_ball(24)) ** 2).mean()) < 0.04
+    assert np.sqrt(((finer - under_a_ball(24)) ** 2).mean()) < 0.06
     np.testing.assert_array_equal(decoder.distances_in(every, n), rows)
 
 
