@@ -49,16 +49,13 @@ class BasisSettings(Settings):
     file_budget: int | None = Field(
         None, ge=1000, description="Compact: bytes of the file instead; the least error for them"
     )
-    bits_rows: int = Field(
-        48, ge=4, le=256, multiple_of=2, description="Bits: rows of directions of the file"
-    )
     values: int = Field(48, ge=1, le=65_535, description="Paper: singular values a cluster")
     contribution: float | None = Field(
         None, gt=0.0, le=1.0, description="Paper: share of the singular values' sum instead"
     )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"rmse": 0.018, "bits_rows": 24},
+        "test": {"rmse": 0.018},
         "paper": {"coding": "paper"},
     }
 
@@ -85,13 +82,11 @@ def check_compression(sources: Mapping[str, Source], settings: Mapping[str, Sett
                 f"{name}: values is {basis.values}; expected at most {rows}, the rows or columns "
                 "of the matrix."
             )
-    elif basis.coding == "bits":
-        if basis.bits_rows**2 > rays.directions:
-            raise ValueError(
-                f"{name}: bits_rows is {basis.bits_rows}; expected at most "
-                f"{math.isqrt(rays.directions)}, the rows of directions of visibility."
-            )
-    elif basis.file_budget is None and basis.rmse < 1.5 * clustering.shared_error:
+    elif (
+        basis.coding == "compact"
+        and basis.file_budget is None
+        and basis.rmse < 1.5 * clustering.shared_error
+    ):
         raise ValueError(
             f"{name}: rmse is {basis.rmse:g}; expected at least 1.5 times shared_error, "
             f"{clustering.shared_error:g}, for the shared basis leaves that out already."
@@ -204,7 +199,7 @@ def ssdf_basis(
     if settings.coding == "paper":
         coded = _papers_form(settings, progress, scene_mesh, ssdf_matrix, triangle_clusters)
     elif settings.coding == "bits":
-        coded = _bits_form(settings, scene_mesh, ssdf_matrix, triangle_clusters)
+        coded = _bits_form(scene_mesh, ssdf_matrix, triangle_clusters)
     else:
         coded = _compact_form(settings, triangle_clusters)
     progress(0.8)
@@ -278,21 +273,17 @@ def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Co
 
 
 def _bits_form(
-    settings: BasisSettings,
-    scene_mesh: xr.Dataset,
-    ssdf_matrix: xr.Dataset,
-    triangle_clusters: xr.Dataset,
+    scene_mesh: xr.Dataset, ssdf_matrix: xr.Dataset, triangle_clusters: xr.Dataset
 ) -> _Coded:
     import numpy as np
 
     from pipelines.ssdf_lighting.compression.bits_file import CodedBits, bits_to_bytes
     from pipelines.ssdf_lighting.compression.decoder import Decoder
-    from pipelines.ssdf_lighting.distances.rebuilt import visible_at
 
-    n = settings.bits_rows
-    seen = np.concatenate([visible_at(block, n) for _, block in distance_blocks(ssdf_matrix)])
+    # In the matrix's own directions: of fewer, what sees less than a cell sees nothing.
+    seen = np.concatenate([block > 0.0 for _, block in distance_blocks(ssdf_matrix)])
     bits = CodedBits(seen, dense_clusters(triangle_clusters))
     file = bits_to_bytes(bits, scene_mesh["triangles"].values)
     decoder = Decoder.of_file(file)
-    shown = {"rows of directions": n, "visible share": float(seen.mean())}
+    shown = {"visible share": float(seen.mean())}
     return _Coded(file_variables(file), decoder, len(file), decoder.resident_bytes, shown)
