@@ -26,6 +26,12 @@ from numpy.typing import NDArray
 from assets_defs.ssdf_lighting.datasets import scene_of, shared_basis_of, visible_of
 from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.compression import compact as coding
+from pipelines.ssdf_lighting.compression.bits_file import (
+    CodedBits,
+    bits_from_bytes,
+    bits_to_bytes,
+    resident_of_bits,
+)
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes, to_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.entropy_coding import decode, encode
@@ -37,7 +43,7 @@ from pipelines.ssdf_lighting.compression.visibility_bits import (
     encode_visibility,
 )
 from pipelines.ssdf_lighting.distances.octahedral import solid_angles, texel_directions
-from pipelines.ssdf_lighting.distances.rebuilt import rebuilt_distances
+from pipelines.ssdf_lighting.distances.rebuilt import rebuilt_distances, visible_at
 from pipelines.ssdf_lighting.distances.visibility import LIFT, RayOrigins, visible_directions
 from pipelines.ssdf_lighting.drawing.frames import DistancesAlong
 from pipelines.ssdf_lighting.light.cosine_lobes import cosine_lobes
@@ -53,6 +59,8 @@ _FINE = 3
 """Rays a side of a texel for the truth."""
 _SHARPNESS = (3.0, 10.0, 30.0, 100.0, 300.0)
 _AXES = 6
+_BITS_ROWS = (48, 64)
+"""Rows of directions of files of bits."""
 _STEPS = (0.05, 0.1, 0.16, 0.25, 0.4)
 """Steps of ours that are tried."""
 _DEGREES = 10
@@ -173,6 +181,7 @@ class _Rows:
         self.scene = scene_of(stored("scene_mesh"))
         self.seen = stored("visibility")
         self.visible = visible_of(self.seen)
+        self.matrix = stored("ssdf_matrix")["distances"]
         self.basis = shared_basis_of(made)
         self.cluster = np.unique(made["vertex_cluster"].values, return_inverse=True)[1]
         self.rmse = float(stored("ssdf_basis")["rmse"])
@@ -192,6 +201,27 @@ class _Rows:
             "resident_bytes": decoder.resident_bytes,
             "decode_s": seconds,
             "multiplications": 4.0 * (1.0 + len(codes.weights) / len(codes.cluster)),
+            **self.relit(decoder.distances_along),
+            "irradiance_db": irradiance_db(self.judged, decoder.distances_along),
+        }
+
+    def of_bits(self, n: int) -> dict[str, Any]:
+        """Of a file of bits in n x n directions, drawn from what is rebuilt from it."""
+        blocks = (
+            self.matrix[k : k + _REBUILT].values for k in range(0, len(self.visible), _REBUILT)
+        )
+        seen = np.concatenate([visible_at(block, n) for block in blocks])
+        file = bits_to_bytes(CodedBits(seen, self.cluster.astype(np.int32)), self.scene.triangles)
+        rebuilt_distances(seen[:1])  # compiles it
+        begin = time.process_time()
+        resident_of_bits(bits_from_bytes(file))
+        seconds = time.process_time() - begin
+        decoder = Decoder.of_file(file)
+        return {
+            "file_bytes": len(file),
+            "resident_bytes": decoder.resident_bytes,
+            "decode_s": seconds,
+            "multiplications": 4.0 * (1.0 + len(decoder.tables.weights) / len(seen)),
             **self.relit(decoder.distances_along),
             "irradiance_db": irradiance_db(self.judged, decoder.distances_along),
         }
@@ -301,6 +331,7 @@ def rival_figures(
     rows = _Rows(stored, relit)
     table = {
         "ours": rows.of_file(rows.file),
+        **{f"bits_coding_{n}": rows.of_bits(n) for n in _BITS_ROWS},
         **rows.bits(),
         "no_shadows": {
             "file_bytes": 0,
@@ -332,7 +363,8 @@ def _open_sky(vertices: NDArray[np.int64], axes: NDArray[np.float32]) -> NDArray
 
 
 def _at_equal_error(rows: _Rows, table: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Bytes of the bits over ours, at the coarsest of ours whose irradiance is not worse."""
+    """Bytes of the bits over ours, at the coarsest of ours whose irradiance is not worse; with
+    `_chosen`, ours may be a file of bits, too."""
     cluster = rows.cluster.astype(np.int32)
     factors = coding.cluster_factors(rows.basis, cluster)
     count = rows.basis.coordinates.shape[0] * rows.basis.vectors.shape[0]
@@ -352,4 +384,11 @@ def _at_equal_error(rows: _Rows, table: dict[str, dict[str, Any]]) -> dict[str, 
         fit = [row for row in tried if row["irradiance_db"] >= table[rival]["irradiance_db"]]
         ours = min((row["file_bytes"] for row in fit), default=None)
         found[f"bits_bytes_ratio{name}"] = ours and table[rival]["file_bytes"] / ours
+        fit += [
+            row
+            for row in (table[f"bits_coding_{n}"] for n in _BITS_ROWS)
+            if row["irradiance_db"] >= table[rival]["irradiance_db"]
+        ]
+        ours = min((row["file_bytes"] for row in fit), default=None)
+        found[f"bits_bytes_ratio{name}_chosen"] = ours and table[rival]["file_bytes"] / ours
     return found

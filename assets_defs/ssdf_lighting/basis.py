@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
@@ -14,6 +15,7 @@ from assets_defs.ssdf_lighting.clusters import ClusterSettings
 from assets_defs.ssdf_lighting.datasets import (
     basis_dataset,
     decoder_of,
+    dense_clusters,
     distance_blocks,
     file_variables,
     pca_variables,
@@ -36,8 +38,10 @@ if TYPE_CHECKING:
 class BasisSettings(Settings):
     """How small, or how exact."""
 
-    coding: Literal["compact", "paper"] = Field(
-        "compact", description="A shared basis in few bits, or the paper's vectors and weights"
+    coding: Literal["compact", "bits", "paper"] = Field(
+        "compact",
+        description="A shared basis in few bits, or bits of visibility from which distances are "
+        "rebuilt when they are loaded, or the paper's vectors and weights",
     )
     rmse: float = Field(
         0.006, gt=0.0, le=1.0, description="Compact: error, radians weighted by solid angle"
@@ -78,7 +82,11 @@ def check_compression(sources: Mapping[str, Source], settings: Mapping[str, Sett
                 f"{name}: values is {basis.values}; expected at most {rows}, the rows or columns "
                 "of the matrix."
             )
-    elif basis.file_budget is None and basis.rmse < 1.5 * clustering.shared_error:
+    elif (
+        basis.coding == "compact"
+        and basis.file_budget is None
+        and basis.rmse < 1.5 * clustering.shared_error
+    ):
         raise ValueError(
             f"{name}: rmse is {basis.rmse:g}; expected at least 1.5 times shared_error, "
             f"{clustering.shared_error:g}, for the shared basis leaves that out already."
@@ -90,8 +98,8 @@ def _sampled_rmse(version: StoredVersion) -> float:
     import numpy as np
 
     basis, matrix = version.dataset, version.input("ssdf_matrix")["distances"]
-    rows = figures.sampled_rows(len(matrix), 384)
-    found = figures.weighted_rmse(decoder_of(basis).distances(rows), matrix[rows].values)
+    rows, n = figures.sampled_rows(len(matrix), 384), math.isqrt(matrix.shape[1])
+    found = figures.weighted_rmse(decoder_of(basis).distances_in(rows, n), matrix[rows].values)
     stored = basis["vertex_rmse"].values[rows].astype(np.float64)
     return float(found / max(np.sqrt((stored**2).mean()), 1e-12))
 
@@ -105,6 +113,9 @@ def _over_budget(version: StoredVersion) -> float:
     settings, basis = version.record["settings"], version.dataset
     if settings["coding"] == "paper":
         return float(basis["bytes_memory"] / basis["bytes_raw"])
+    if settings["coding"] == "bits":
+        directions = version.input("ssdf_matrix").sizes["direction"]
+        return float(basis["bytes_file"] * 8 / (basis.sizes["vertex"] * directions))
     if settings["file_budget"] is not None:
         return float(basis["bytes_file"] / settings["file_budget"])
     return float(basis["rmse"] / settings["rmse"])
@@ -142,7 +153,7 @@ def _basis_pictures(dataset: xr.Dataset) -> Pictures:
         Check(
             "over_budget",
             "Error over the error asked for, or bytes over the bytes asked for; of the paper's "
-            "form, bytes over raw bytes.",
+            "form, bytes over raw bytes; of bits, bits of the file over rays.",
             _over_budget,
             at_most=1.1,
         ),
@@ -187,13 +198,17 @@ def ssdf_basis(
     """Compress the SSDFs, and measure what that does to them."""
     if settings.coding == "paper":
         coded = _papers_form(settings, progress, scene_mesh, ssdf_matrix, triangle_clusters)
+    elif settings.coding == "bits":
+        coded = _bits_form(scene_mesh, ssdf_matrix, triangle_clusters)
     else:
         coded = _compact_form(settings, triangle_clusters)
     progress(0.8)
+    n, raw = math.isqrt(ssdf_matrix.sizes["direction"]), ssdf_matrix["distances"].size * 4
     errors = figures.compression_errors(
-        distance_blocks(ssdf_matrix), coded.decoder.distances, scene_mesh["normals"].values
+        distance_blocks(ssdf_matrix),
+        lambda rows: coded.decoder.distances_in(rows, n),
+        scene_mesh["normals"].values,
     )
-    raw = ssdf_matrix["distances"].size * 4
     counts = {"raw": raw, "file": coded.file_bytes, "memory": coded.memory_bytes}
     return basis_dataset(coded.variables, counts, errors), {
         **coded.shown,
@@ -240,15 +255,11 @@ def _papers_form(
 
 
 def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Coded:
-    import numpy as np
-
     from pipelines.ssdf_lighting.compression import compact
     from pipelines.ssdf_lighting.compression.compact_file import to_bytes
     from pipelines.ssdf_lighting.compression.decoder import Decoder
 
-    # Cluster numbers of vertices without gaps: a cluster of triangles may have no vertex.
-    _, dense = np.unique(triangle_clusters["vertex_cluster"].values, return_inverse=True)
-    basis, cluster = shared_basis_of(triangle_clusters), dense.astype(np.int32)
+    basis, cluster = shared_basis_of(triangle_clusters), dense_clusters(triangle_clusters)
     if settings.file_budget is None:
         codes = compact.quantise_to_rmse(basis, cluster, settings.rmse)
     else:
@@ -258,4 +269,21 @@ def _compact_form(settings: BasisSettings, triangle_clusters: xr.Dataset) -> _Co
     file = to_bytes(codes)
     shown = {"vectors": len(codes.level), "shared vectors": len(codes.shared)}
     decoder = Decoder.of_file(file)
+    return _Coded(file_variables(file), decoder, len(file), decoder.resident_bytes, shown)
+
+
+def _bits_form(
+    scene_mesh: xr.Dataset, ssdf_matrix: xr.Dataset, triangle_clusters: xr.Dataset
+) -> _Coded:
+    import numpy as np
+
+    from pipelines.ssdf_lighting.compression.bits_file import CodedBits, bits_to_bytes
+    from pipelines.ssdf_lighting.compression.decoder import Decoder
+
+    # In the matrix's own directions: of fewer, what sees less than a cell sees nothing.
+    seen = np.concatenate([block > 0.0 for _, block in distance_blocks(ssdf_matrix)])
+    bits = CodedBits(seen, dense_clusters(triangle_clusters))
+    file = bits_to_bytes(bits, scene_mesh["triangles"].values)
+    decoder = Decoder.of_file(file)
+    shown = {"visible share": float(seen.mean())}
     return _Coded(file_variables(file), decoder, len(file), decoder.resident_bytes, shown)

@@ -189,6 +189,14 @@ def clusters_of(triangle_clusters: xr.Dataset) -> Clusters:
     return Clusters(triangle_clusters["cluster"].values, triangle_clusters["vertex_cluster"].values)
 
 
+def dense_clusters(triangle_clusters: xr.Dataset) -> NDArray[np.int32]:
+    """Numbers of vertices' clusters (V,), without gaps: some clusters may have no vertex."""
+    import numpy as np
+
+    _, dense = np.unique(triangle_clusters["vertex_cluster"].values, return_inverse=True)
+    return dense.astype(np.int32)
+
+
 def shared_basis_of(triangle_clusters: xr.Dataset) -> SharedBasis:
     """The shared basis that a `triangle_clusters` dataset holds."""
     from pipelines.ssdf_lighting.compression.shared_basis import SharedBasis
@@ -205,7 +213,7 @@ def shared_basis_of(triangle_clusters: xr.Dataset) -> SharedBasis:
 
 
 def file_variables(file: bytes) -> Mapping[str, Any]:
-    """Variables of an `ssdf_basis` dataset in the compact form."""
+    """Variables of an `ssdf_basis` dataset that is a file."""
     import numpy as np
 
     return {"file": (("byte",), np.frombuffer(file, np.uint8))}
@@ -235,7 +243,7 @@ def basis_dataset(
 
 
 def decoder_of(ssdf_basis: xr.Dataset) -> Decoder:
-    """Decodes what an `ssdf_basis` dataset holds, in either form."""
+    """Decodes what an `ssdf_basis` dataset holds, in any form."""
     from pipelines.ssdf_lighting.compression.clustered_pca import ClusteredPca
     from pipelines.ssdf_lighting.compression.decoder import Decoder
 
@@ -243,6 +251,20 @@ def decoder_of(ssdf_basis: xr.Dataset) -> Decoder:
         return Decoder.of_file(ssdf_basis["file"].values.tobytes())
     pca = ClusteredPca(*(ssdf_basis[name].values for name in _PCA))
     return Decoder.of_pca(pca, ssdf_basis.sizes["vertex"])
+
+
+def packed_basis(ssdf_basis: xr.Dataset, triangle_clusters: xr.Dataset) -> xr.Dataset:
+    """`ssdf_basis` as a package holds it, for readers that rebuild nothing: instead of bits, the
+    compact form with the error that what is rebuilt from them has."""
+    from pipelines.ssdf_lighting.compression.bits_file import VERSION
+    from pipelines.ssdf_lighting.compression.compact import quantise_to_rmse
+    from pipelines.ssdf_lighting.compression.compact_file import to_bytes
+
+    if "file" not in ssdf_basis or ssdf_basis["file"].values[8] != VERSION:
+        return ssdf_basis
+    basis, rmse = shared_basis_of(triangle_clusters), float(ssdf_basis["rmse"])
+    codes = quantise_to_rmse(basis, dense_clusters(triangle_clusters), rmse)
+    return ssdf_basis.drop_dims("byte").assign(file_variables(to_bytes(codes)))
 
 
 # ---- bounce_factors --------------------------------------------------------------------------

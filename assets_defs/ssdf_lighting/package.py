@@ -9,7 +9,13 @@ from pydantic import Field
 
 from assets_defs.packages import PackageSettings, package_dataset, read_back_check
 from assets_defs.settings import Preset
-from assets_defs.ssdf_lighting.datasets import bounce_of, decoder_of, lights_of, scene_of
+from assets_defs.ssdf_lighting.datasets import (
+    bounce_of,
+    decoder_of,
+    lights_of,
+    packed_basis,
+    scene_of,
+)
 from assets_defs.ssdf_lighting.declaration import ENVIRONMENTS, SCENES, SSDF
 from assets_defs.system import Result
 from storage.schemas import ssdf_lighting as schemas
@@ -53,8 +59,9 @@ def _expected(version: StoredVersion) -> dict[str, Any]:
 
     from pipelines.ssdf_lighting.light.sphere_maps import downsampled
 
-    basis, lights = version.input("ssdf_basis"), version.input("environment_lights")
     scene, clusters = version.input("scene_mesh"), version.input("triangle_clusters")
+    lights = version.input("environment_lights")
+    basis = packed_basis(version.input("ssdf_basis"), clusters)
     bounce = version.input("bounce_factors")
     rows = min(lights.sizes["row"], 64)
     radiance = downsampled(lights["radiance"].values, rows).astype(np.float32)
@@ -116,7 +123,7 @@ def lit_package(
     inputs = _Inputs(
         scene_mesh,
         triangle_clusters,
-        ssdf_basis,
+        packed_basis(ssdf_basis, triangle_clusters),
         bounce_factors,
         environment_lights,
         float(relit_frames["exposure"]),

@@ -171,7 +171,7 @@ SSDF_BASIS = Schema(
             ("byte",),
             "uint8",
             "1",
-            "The compact form, entropy coded (docs/ssdf_file.md)",
+            "The compact form, or bits, entropy coded (docs/ssdf_file.md)",
             optional=True,
         ),
         "vectors": Variable(

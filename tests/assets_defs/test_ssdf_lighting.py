@@ -18,7 +18,14 @@ from assets_defs.ssdf_lighting.graph import SSDF
 from pipelines.geometry import shapes
 from pipelines.light import built_in_environments
 from pipelines.ssdf_lighting import figures, scene
-from pipelines.ssdf_lighting.compression import compact, lookup, shared_basis, triangle_clusters
+from pipelines.ssdf_lighting.compression import (
+    bits_file,
+    compact,
+    lookup,
+    shared_basis,
+    triangle_clusters,
+)
+from pipelines.ssdf_lighting.compression import decoder as decoder_module
 from pipelines.ssdf_lighting.compression.compact_file import from_bytes
 from pipelines.ssdf_lighting.compression.compact_memory import (
     cluster_bases,
@@ -37,6 +44,7 @@ from pipelines.ssdf_lighting.drawing import (
 )
 from pipelines.ssdf_lighting.light import environment_fit, fit_quality, interreflection
 from pipelines.ssdf_lighting.light.spherical_gaussians import rotated
+from storage.packages import read_package
 from tests.assets_defs.regressions import Regression, assert_check_finds
 
 SCENE = {"scene": "teapot"}
@@ -113,6 +121,34 @@ def test_the_papers_form_and_a_byte_budget(make_house: Any) -> None:
     house.launcher.launch(Request(SSDF, [SCENE], "test", budget))
     small = _open(house, "ssdf_basis", SCENE)
     assert 18_000 < int(small["bytes_file"]) <= 20_000
+
+
+@pytest.mark.slow
+def test_bits_go_through_to_the_package(make_house: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    house = make_house()
+    house.launcher.launch(Request(SSDF, [KEYS], "test", TINY | {"coding": "bits"}))
+    made, matrix = (_open(house, name, SCENE) for name in ("ssdf_basis", "ssdf_matrix"))
+    coded = bits_file.bits_from_bytes(made["file"].values.tobytes())
+    seen = matrix["distances"].values > 0.0
+    np.testing.assert_array_equal(coded.visible, seen)
+    rows, decoder = np.arange(0, len(seen), 50), decoder_of(made)
+    off = decoder.distances_in(rows, 32) - matrix["distances"].values[rows]
+    errors = np.sqrt((((off * root_weights(1024)).astype(np.float64)) ** 2).mean(axis=1))
+    np.testing.assert_allclose(errors, made["vertex_rmse"].values[rows], rtol=1e-3)
+    assert made["bytes_memory"] == decoder.resident_bytes
+    # A package holds the compact form, as far off as what is rebuilt.
+    file = _open(house, "lit_package", KEYS)["file"].values.tobytes()
+    packed = Decoder.of_file(read_package(file, "lit.tsuya").array("ssdf").tobytes())
+    away = (packed.distances(rows) - matrix["distances"].values[rows]) * root_weights(1024)
+    rmse = np.sqrt((away.astype(np.float64) ** 2).mean())
+    assert 0.7 * float(made["rmse"]) < rmse < 1.3 * float(made["rmse"])
+    # Distances that are rebuilt wrongly are found.
+    decoder_module._rebuilt.cache_clear()
+    off_by = Regression(
+        "rmse", bits_file, "rebuilt_distances", lambda right, seen: right(seen) + 0.15, SCENE
+    )
+    assert_check_finds(house, SSDF, off_by, monkeypatch)
+    decoder_module._rebuilt.cache_clear()
 
 
 @pytest.mark.slow

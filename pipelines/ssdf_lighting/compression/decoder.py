@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import struct
 from collections.abc import Callable
 
 import numpy as np
@@ -14,11 +15,14 @@ from pipelines.ssdf_lighting.compression.decoder_tables import (
     decoded_rows,
     tables_of_packed,
     tables_of_pca,
+    tables_of_resident,
 )
 from pipelines.ssdf_lighting.compression.resident import ResidentTables, resident_tables
 
 Floats = NDArray[np.float32]
 DistancesAlong = Callable[[NDArray[np.integer], Floats], Floats]
+_BITS = struct.pack("<H", 2)
+"""The version of files that hold bits, as it stands in them."""
 
 
 class Decoder:
@@ -47,7 +51,13 @@ class Decoder:
 
     @classmethod
     def of_file(cls, data: bytes) -> Decoder:
-        """Of the compact form's file. Distances raise ValueError for what is no such file."""
+        """Of a file in either version of docs/ssdf_file.md.
+
+        Of version 2, bits, whole rows are what is drawn from, too, in its directions. Distances
+        raise ValueError for what is no such file.
+        """
+        if data[8:10] == _BITS:
+            return cls(lambda: tables_of_resident(_rebuilt(data)), lambda: _rebuilt(data))
 
         def tables() -> DecoderTables:
             from pipelines.ssdf_lighting.compression.compact_file import from_bytes
@@ -86,6 +96,21 @@ class Decoder:
         """d (P, D) float32, radians, of vertices (P,) in all directions."""
         return decoded_rows(self.tables, vertices)
 
+    def distances_in(self, vertices: NDArray[np.integer], n: int) -> Floats:
+        """d (P, n²) float32, radians, of vertices (P,) in n x n directions: as `distances`,
+        interpolated where the form has others."""
+        from pipelines.ssdf_lighting.distances.octahedral import bilinear_taps, texel_directions
+
+        rows = self.distances(vertices)
+        if self.tables.resolution == n:
+            return rows
+        taps = bilinear_taps(texel_directions(n), self.tables.resolution)
+        shares = taps.weights.astype(np.float32)
+        found = np.zeros((len(rows), n * n), np.float32)
+        for k in range(4):
+            found += shares[:, k] * rows[:, taps.texels[:, k]]
+        return found
+
     @property
     def distances_along(self) -> DistancesAlong:
         """Function of vertices (P,) and unit vectors (P, L, 3) float32: d (P, L) float32, radians.
@@ -98,3 +123,12 @@ class Decoder:
         if isinstance(kept, ResidentTables):
             return functools.partial(resident_along, kept)
         return functools.partial(decoded_along, kept)
+
+
+@functools.lru_cache(maxsize=1)
+def _rebuilt(data: bytes) -> ResidentTables:
+    """What is drawn from a file of bits: kept, for it takes seconds, and assets and their checks
+    ask for the same one."""
+    from pipelines.ssdf_lighting.compression.bits_file import bits_from_bytes, resident_of_bits
+
+    return resident_of_bits(bits_from_bytes(data))

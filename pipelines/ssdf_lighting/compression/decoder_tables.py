@@ -19,6 +19,7 @@ from pipelines.ssdf_lighting.compression.compact_memory import (
     row_bytes,
     unpack_rows,
 )
+from pipelines.ssdf_lighting.compression.resident import ResidentTables
 
 Floats = NDArray[np.float32]
 
@@ -96,6 +97,41 @@ def tables_of_pca(pca: ClusteredPca, vertices: int) -> DecoderTables:
     start[pca.row_vertex[::-1]] = row_start[::-1]
     centres = np.zeros((len(sizes), pca.vectors.shape[1]), np.float32)
     return make_tables(centres, pca.vectors, pca.first, cluster, pca.weights, start)
+
+
+def tables_of_resident(resident: ResidentTables) -> DecoderTables:
+    """What is resident, unfolded, at its own resolution."""
+    places, counts = resident.resolution**2, resident.counts.astype(np.int64)
+    columns = counts.sum(axis=1)
+    first = resident.scale_start.astype(np.int64)
+    parts = []
+    for number, (words, whole, halves) in enumerate(counts):
+        begin = resident.starts[number].astype(np.int64)
+        wide, pairs = places * np.array([words, whole, (halves + 1) // 2]), (halves + 1) // 2
+        ends = begin + wide
+        packed = resident.nibbles[begin[2] : ends[2]].reshape(places, pairs)
+        nibbles = np.stack([packed & 15, packed >> 4], axis=2).reshape(places, 2 * pairs)
+        codes = np.concatenate(
+            [
+                resident.words[begin[0] : ends[0]].reshape(places, words),
+                resident.bytes[begin[1] : ends[1]].reshape(places, whole),
+                nibbles[:, :halves].astype(np.float32) - 8.0,
+            ],
+            axis=1,
+            dtype=np.float32,
+        )
+        scale = resident.scale[first[number] : first[number] + columns[number]]
+        parts.append((codes * scale).ravel())
+    lengths = np.array([len(part) for part in parts])
+    return DecoderTables(
+        np.concatenate(parts),
+        np.cumsum(lengths) - lengths,
+        columns - 1,
+        resident.cluster.astype(np.int64),
+        resident.weights.astype(np.float32),
+        resident.weight_start.astype(np.int64),
+        resident.resolution,
+    )
 
 
 def decoded_rows(tables: DecoderTables, vertices: NDArray[np.integer]) -> Floats:

@@ -17,6 +17,7 @@ from pipelines.ssdf_lighting.compression.bits_file import (
     resident_of_bits,
     rows_of_bits,
 )
+from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.lookup import matrix_along, resident_along
 from pipelines.ssdf_lighting.distances.octahedral import texel_directions
 from pipelines.ssdf_lighting.distances.rebuilt import rebuilt_distances, visible_at
@@ -150,3 +151,27 @@ def test_what_is_resident_gives_the_distances(coded: CodedBits) -> None:
     # What a mesh knows better is taken in.
     nearer = resident_of_bits(coded, lambda vertices, rows: rows - 0.1)
     assert np.abs(resident_along(nearer, every, axes) - along + 0.1).mean() < 0.02
+
+
+def test_a_decoder_reads_either_version_and_draws_what_it_tells(coded: CodedBits) -> None:
+    decoder = Decoder.of_file(bits_to_bytes(coded, grid()))
+    every, n = np.arange(len(coded.cluster)), coded.resolution
+    ways = texel_directions(n).astype(np.float32)
+    axes = np.broadcast_to(ways, (len(every), *ways.shape))
+    rows = decoder.distances(every)
+    np.testing.assert_allclose(decoder.distances_along(every, axes), rows, atol=1e-4)
+    exact = under_a_ball(n)
+    assert np.sqrt(((rows - exact) ** 2).mean()) < 0.06
+    assert np.sqrt(((rows[1:] - exact[:-1]) ** 2).mean()) > 0.1  # a null: the vertex before
+    # Other directions than the file's lie between its own.
+    finer = decoder.distances_in(every, 24)
+    assert np.sqrt(((finer - under_a_ball(24)) ** 2).mean()) < 0.06
+    np.testing.assert_array_equal(decoder.distances_in(every, n), rows)
+
+
+@pytest.mark.parametrize("share", [0.03, 0.1, 0.5])
+def test_a_decoder_refuses_a_cut_file_of_bits(coded: CodedBits, share: float) -> None:
+    file = bits_to_bytes(coded, grid())
+    decoder = Decoder.of_file(file[: int(share * len(file))])
+    with pytest.raises(ValueError, match=r"file|ends"):
+        decoder.distances_along(np.arange(1), np.ones((1, 1, 3), np.float32))
