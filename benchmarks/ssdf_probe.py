@@ -161,12 +161,14 @@ def _compared(
         "probe": direct.radiance[0],
         "bounce": _drawn(prepared, lights, along, prepared.bounce).radiance[0],
     }
-    everywhere = np.ones_like(shown)
+    everywhere, edges = np.ones_like(shown), direct.covered[..., None]
+
+    def on_background(name: str, picture: NDArray[np.floating]) -> NDArray[np.floating]:
+        filled = np.where(edges > 0, truth[name].mean(axis=0), picture)
+        return filled + (1.0 - edges) * np.array(frames.BACKGROUND) * (edges > 0)
+
     for name, picture in pictures.items():
-        true = truth[name].mean(axis=0)
-        filled = np.where(direct.covered[..., None] > 0, true, picture)
-        edges = direct.covered[..., None]
-        filled = filled + (1.0 - edges) * np.array(frames.BACKGROUND) * (edges > 0)
+        filled = on_background(name, picture)
         found[f"{name}_psnr_db"] = against(name, picture)
         found[f"{name}_flip"] = float(flip_map(codes(picture), codes(filled))[shown].mean())
         found[f"{name}_psnr_db_frame"] = psnr(codes(picture), codes(filled), everywhere)
@@ -175,11 +177,15 @@ def _compared(
         halves = [codes(half) for half in truth[name]]
         noise = psnr(halves[0], halves[1], shown)
         found[f"{name}_noise_psnr_db"] = noise + 10 * float(np.log10(4))
+    exact, even = (
+        _drawn(prepared, own, distances).radiance[0]
+        for own, distances in ((lights, plain), (_even(radiance), along))
+    )
+    filled = on_background("probe", even)
     found |= {
-        "probe_psnr_db_uncompressed": against("probe", _drawn(prepared, lights, plain).radiance[0]),
-        "probe_psnr_db_even": against(
-            "probe", _drawn(prepared, _even(radiance), along).radiance[0]
-        ),
+        "probe_psnr_db_uncompressed": against("probe", exact),
+        "probe_psnr_db_even": against("probe", even),
+        "probe_flip_even": float(flip_map(codes(even), codes(filled))[shown].mean()),
         "probe_psnr_db_upside_down": against(
             "probe", _drawn(prepared, upside_down, along).radiance[0]
         ),

@@ -35,14 +35,15 @@ class LightSettings(Settings):
     """The environment, and how closely its lights follow it."""
 
     lights: int = Field(24, ge=1, le=24, description="Spherical Gaussians of an environment, N")
-    least_sharpness: float = Field(3.0, gt=0.0, le=100.0, description="Least λ of a light")
+    least_sharpness: float = Field(8.0, gt=0.0, le=100.0, description="Least λ of a light")
     most_sharpness: float = Field(
         1000.0, ge=100.0, le=1e4, description="Largest λ of a light that is no sun"
     )
     sun_azimuth: float = Field(25.0, ge=-360.0, le=360.0, description="Sky: the sun's, degrees")
     sun_elevation: float = Field(35.0, ge=5.0, le=85.0, description="Sky: the sun's, degrees")
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
-        "test": {"lights": 6},
+        # So few have to be wider, or they leave dark between them.
+        "test": {"lights": 6, "least_sharpness": 3.0},
     }
 
 

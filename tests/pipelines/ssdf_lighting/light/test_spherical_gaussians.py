@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.special import i1e, ndtr
 
+from assets_defs.ssdf_lighting.lights import LightSettings
 from pipelines.light import environment_maps
 from pipelines.ssdf_lighting.light.spherical_gaussians import (
     Lights,
@@ -316,3 +317,20 @@ def test_softened_lights_keep_their_flux_and_wide_ones_their_width() -> None:
     np.testing.assert_allclose(softened(lights, 0.0).sharpness, lights.sharpness, rtol=1e-15)
     with pytest.raises(ValueError, match="rmse is -0"):
         softened(lights, -0.1)
+
+
+@pytest.mark.parametrize("half", [10.0, 20.0, 45.0])
+def test_an_even_sky_through_a_slit_is_nearer_by_lights_that_are_not_wide(
+    half: float, table: VisibleTable
+) -> None:
+    """Of the band within ``half`` degrees of the equator the true share is its sine; d knows the
+    nearer edge only. The widest light of the default, against one as wide as was once let in."""
+    sine = 1.0 - 2.0 * (np.arange(4000) + 0.5) / 4000
+    distance = math.radians(half) - np.abs(np.arcsin(sine))
+
+    def error(sharpness: float) -> float:
+        share = float(visible_share(table, distance, sharpness).mean())
+        return abs(share / math.sin(math.radians(half)) - 1.0)
+
+    assert error(LightSettings().least_sharpness) < 0.5 * error(3.0)
+    assert error(1000.0) < 0.002
