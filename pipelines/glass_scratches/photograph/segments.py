@@ -25,13 +25,15 @@ _REACH = 2.3
 """Points of one chain are no farther apart, in pixels and steps of direction."""
 _SHORTEST = 12.0
 """Pixels: what is shorter tells no direction."""
-_SLENDER = 3.0
+_SLENDER = 4.0
 """Least length over width."""
 _LOPSIDED = 0.5
 """Of a scratch's contrast: what both sides may differ by. An edge's differ by more."""
 _PROFILE = 16
 """Pixels of a cross-section, to each side."""
 _STEP = 0.25
+_MOST_POINTS = 0.4
+"""Points of lines over pixels: thin scratches over an eighth of the area make 0.14."""
 _FILLED = 0.6
 """Least share of a scratch's length that has points."""
 _WEAK = 0.3
@@ -91,9 +93,12 @@ def find_segments(contrast: FloatArray) -> Found:
     """The scratches of a picture (y, x) of contrasts (``ridges.line_contrast``), strongest first.
 
     All are taken to be bright, or all dark, whichever there is more of: one light shows them.
+    Raises ValueError for lines nearly everywhere.
     """
     dark = is_dark(contrast)
     ridges = find_ridges(contrast, dark=dark)
+    if len(ridges.angle) > _MOST_POINTS * contrast.size:
+        raise ValueError("lines nearly everywhere, more a texture")
     shown = -contrast if dark else contrast
     arcs = [arc for chain in _chains(ridges) for arc in _arcs(ridges, chain)]
     measured = [one for arc in arcs if (one := _measured(shown, arc)) is not None]
