@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assets_defs.glass_scratches.photograph_files import is_photograph
 from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
 from storage.readers.photographs import SUFFIXES
@@ -19,11 +20,6 @@ SETTINGS = ("setting-1", "setting-2", "ground", "clear", "worn")
 """Table 1's two; the second with ground and with clear walls; and scratches as years leave them."""
 OBJECTS = ("plate", "teapot")
 ENVIRONMENTS = ("room", "lamps", "sky", "uniform")
-
-
-def is_photograph(source: Source) -> bool:
-    """Whether a setting is a photograph of scratched glass, not a cross-section."""
-    return source.path is not None and source.path.suffix.lower() in SUFFIXES
 
 
 def _check_setting(source: Source, settings: Mapping[str, Any]) -> None:

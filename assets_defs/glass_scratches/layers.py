@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.glass_scratches.declaration import SCRATCHES, is_photograph
+from assets_defs.glass_scratches.declaration import SCRATCHES
+from assets_defs.glass_scratches.photograph_files import is_photograph
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import Pictures, Result

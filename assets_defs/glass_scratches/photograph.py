@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 from pydantic import Field
 
 from assets_defs.checks import Check
-from assets_defs.glass_scratches.declaration import SCRATCHES, is_photograph
-from assets_defs.glass_scratches.photograph_files import LARGEST_SIDE, load_scratches
+from assets_defs.glass_scratches.declaration import SCRATCHES
+from assets_defs.glass_scratches.photograph_files import LARGEST_SIDE, is_photograph, load_scratches
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import NOTES, Pictures, Result

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from assets_defs.sources import Source
+from storage.readers.photographs import SUFFIXES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +27,11 @@ class ScratchPhotograph(NamedTuple):
     luminance: NDArray[np.float32]
     scratches: PhotographScratches
     notes: tuple[str, ...]
+
+
+def is_photograph(source: Source) -> bool:
+    """Whether a setting is a photograph of scratched glass, not a cross-section."""
+    return source.path is not None and source.path.suffix.lower() in SUFFIXES
 
 
 def load_scratches(source: Source, settings: Mapping[str, Any]) -> ScratchPhotograph:

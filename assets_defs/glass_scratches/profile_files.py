@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from assets_defs.glass_scratches.declaration import is_photograph
+from assets_defs.glass_scratches.photograph_files import is_photograph
 from assets_defs.sources import Source
 
 if TYPE_CHECKING:
