@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scratches_glass import glass_figures
+from benchmarks.scratches_photo import photograph_figures
 from benchmarks.scratches_pictures import picture_figures
 from pipelines.geometry.solid_shapes import plate
 from pipelines.glass_scratches.drawing.frames import object_cameras
@@ -59,7 +60,7 @@ def run(scale: str) -> dict[str, Any]:
     )
     for part in parts:
         figures |= part()
-    figures |= picture_figures(_material(), scale) | glass_figures(scale)
+    figures |= picture_figures(_material(), scale) | glass_figures(scale) | photograph_figures()
     from tests.reference.groove import reference_figures
 
     return figures | reference_figures()

@@ -30,6 +30,16 @@ from docs.fur_pictures import close_and_against_the_light, fur_scene, in_wind
 from docs.thin_pictures import shadow_picture, thin_picture
 from pipelines.drawing.colour import to_8bit
 from pipelines.glass_scratches.drawing.frames import picture_exposure
+from pipelines.glass_scratches.layers.coverage import coverage_maps
+from pipelines.glass_scratches.photograph.photograph_layers import (
+    layers_like,
+    photograph_scratches,
+)
+from pipelines.glass_scratches.photograph.pictures import (
+    found_picture,
+    like_picture,
+    photograph_picture,
+)
 from pipelines.light.room import room
 from pipelines.ssdf_lighting.drawing.pictures import rate_distortion_picture
 from pipelines.street_billboards import figures
@@ -37,6 +47,7 @@ from pipelines.street_billboards.drawing.street_stage import StreetStage
 from pipelines.street_billboards.textures import eigen_textures
 from pipelines.street_billboards.textures.atlases import pack_pages
 from storage.versions import VersionedStore
+from tests.pipelines.glass_scratches.photographs import SPEC, photograph
 
 FOLDER = Path(__file__).parent / "pictures"
 SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
@@ -187,6 +198,7 @@ def _scratches(store: VersionedStore) -> None:
     )
     _row("scratches-frames.png", overview["plate-far"], overview["plate-close"])
     _row("scratches-denoised.png", *_denoised(store))
+    _row("scratches-photograph.png", *_photograph())
     _row("scratches-room.jpg", _room())
     _row("scratches-teapot.png", overview["teapot-far"], _beside_stage(store))
     _row("scratches-walls.png", overview["plate-diffuse-to-clear"])
@@ -207,6 +219,15 @@ def _denoised(store: VersionedStore) -> list[NDArray[np.uint8]]:
         _glass(store, "noise-beside-clean", {"object": name, "setting": "setting-2"})
         for name in ("plate", "teapot")
     ]
+
+
+def _photograph() -> list[NDArray[np.uint8]]:
+    """A photograph made of known scratches, those found in it, and layers like them."""
+    _, luminance = photograph(SPEC, 1, _HEIGHT)
+    found = photograph_scratches(luminance)
+    coverage = coverage_maps(layers_like(found, 0), 2 * _HEIGHT)
+    again = like_picture(luminance, found, coverage)
+    return [photograph_picture(luminance), found_picture(luminance, found), again]
 
 
 def _room() -> NDArray[np.uint8]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pipelines.geometry.solids import Solid
     from pipelines.glass_scratches.drawing.frames import GlassFrames
     from pipelines.glass_scratches.layers.features import Layers
+    from pipelines.glass_scratches.photograph.photograph_layers import PhotographScratches
     from pipelines.glass_scratches.scratched_glass import ScratchMaterial
     from pipelines.glass_scratches.tables.bsdf_table import BsdfTable
     from pipelines.glass_scratches.tables.fresnel import Fresnel
@@ -117,6 +118,62 @@ def scratch_tables_of(
     made = bsdf_table_of(scratch_table_2d, scratch_table.attrs["fresnel"])
     table = made._replace(rho=scratch_table["rho"].values.astype(np.float64))
     return table, lobe_from_sums(table, scratch_table["cdf"].values, scratch_table["share"].values)
+
+
+_SEGMENT_VARIABLES = ("centre", "direction", "length", "width", "contrast", "turn")
+"""Names of the fields of `Segments` in a dataset: `angle` is the layers'."""
+
+
+def photograph_dataset(
+    luminance: NDArray[np.float32], scratches: PhotographScratches | None
+) -> xr.Dataset:
+    """`scratch_photo` of a photograph (y, x) and its scratches; None for none, and no pixels."""
+    import numpy as np
+    import xarray as xr
+
+    if scratches is None:
+        from pipelines.glass_scratches.photograph.segments import Segments
+
+        nothing = np.zeros(0)
+        segments = Segments(np.zeros((0, 2)), *([nothing] * 5))
+        layer, angle, strength = nothing.astype(np.int32), nothing.astype(np.float32), nothing
+        attrs = {}
+    else:
+        segments, layer, angle, strength = scratches[:4]
+        attrs = {"full": scratches.full, "dark": scratches.dark, "noise": scratches.noise}
+    columns = zip(_SEGMENT_VARIABLES, segments, strict=True)
+    return xr.Dataset(
+        {
+            "luminance": (("row", "column"), luminance),
+            **{
+                name: (("segment", "axis") if name == "centre" else "segment", values)
+                for name, values in columns
+            },
+            "strength": ("segment", strength),
+            "segment_layer": ("segment", layer),
+            "angle": ("layer", angle),
+        },
+        attrs=attrs,
+    )
+
+
+def photograph_scratches_of(scratch_photo: xr.Dataset) -> PhotographScratches | None:
+    """The scratches of a `scratch_photo` dataset; None of one that is no photograph's."""
+    from pipelines.glass_scratches.photograph.photograph_layers import PhotographScratches
+    from pipelines.glass_scratches.photograph.segments import Segments
+
+    if scratch_photo.sizes["layer"] == 0:
+        return None
+    return PhotographScratches(
+        Segments(*(scratch_photo[name].values for name in _SEGMENT_VARIABLES)),
+        scratch_photo["segment_layer"].values,
+        scratch_photo["angle"].values,
+        scratch_photo["strength"].values,
+        scratch_photo.attrs["full"],
+        scratch_photo.attrs["dark"],
+        scratch_photo.attrs["noise"],
+        (scratch_photo.sizes["row"], scratch_photo.sizes["column"]),
+    )
 
 
 def layers_dataset(
@@ -235,8 +292,9 @@ LOADERS: dict[str, Callable[[StoredVersion], object]] = {
     "scratch_profile": lambda version: version.dataset["points"].values,
     "scratch_table_2d": lambda version: table_2d_of(version.dataset),
     "scratch_table": _lobe,
+    "scratch_photo": lambda version: photograph_scratches_of(version.dataset),
     "scratch_layers": lambda version: layers_of(version.dataset),
     "glass_object": lambda version: solid_of(version.dataset),
 }
-"""What `tsuya.load` gives of an asset: points (P, 2), Table2D or BsdfTable, Lobe, Layers,
-Solid."""
+"""What `tsuya.load` gives of an asset: points (P, 2), Table2D or BsdfTable, Lobe,
+PhotographScratches or None, Layers, Solid."""

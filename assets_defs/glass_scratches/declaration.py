@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from assets_defs.glass_scratches.photograph_files import is_photograph
 from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
+from storage.readers.photographs import SUFFIXES
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
@@ -20,10 +22,16 @@ OBJECTS = ("plate", "teapot")
 ENVIRONMENTS = ("room", "lamps", "sky", "uniform")
 
 
-def _check_profile(source: Source, settings: Mapping[str, Any]) -> None:
+def _check_setting(source: Source, settings: Mapping[str, Any]) -> None:
+    """Settings are those of `scratch_profile` or of `scratch_photo`: each asset's own file."""
+    from assets_defs.glass_scratches.photograph_files import load_scratches
     from assets_defs.glass_scratches.profile_files import load_profile
 
-    load_profile(source, settings)
+    if is_photograph(source):
+        if "shape" not in settings:
+            load_scratches(source, settings)
+    elif "photo_side" not in settings:
+        load_profile(source, settings)
 
 
 def _check_object(source: Source, settings: Mapping[str, Any]) -> None:
@@ -80,8 +88,11 @@ SCRATCHES = System(
             builtin=SETTINGS,
             examples=("setting-2", "worn"),
             default="setting-2",
-            suffixes=(".csv", ".txt", ".tsv", ".dat", ".asc", ".prf", ".smd", ".sdf"),
-            check=_check_profile,
+            suffixes=(
+                *(".csv", ".txt", ".tsv", ".dat", ".asc", ".prf", ".smd", ".sdf"),
+                *SUFFIXES,
+            ),
+            check=_check_setting,
         ),
         Dimension(
             "object",

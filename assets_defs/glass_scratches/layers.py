@@ -9,6 +9,7 @@ from pydantic import Field
 
 from assets_defs.checks import Check
 from assets_defs.glass_scratches.declaration import SCRATCHES
+from assets_defs.glass_scratches.photograph_files import is_photograph
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.system import Pictures, Result
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipelines.glass_scratches.layers.settings import LayerSpec
+    from pipelines.glass_scratches.photograph.figures import Likeness
 
 _STAGE_SIZE = 256
 MAP_SAMPLES = 16
@@ -73,6 +75,20 @@ def _layers_can_be(sources: Mapping[str, Source], settings: Mapping[str, Setting
     scattered = settings.get("scratch_layers")
     if isinstance(scattered, LayerSettings):
         layer_spec(scattered).validate()
+        source = sources.get("setting")
+        if source is not None and is_photograph(source):
+            _check_unset(source, scattered)
+
+
+def _check_unset(source: Source, settings: LayerSettings) -> None:
+    """Raise ValueError for a look that is set where the photograph tells it."""
+    usual = LayerSettings()
+    for name in LayerSettings.model_fields.keys() - {"resolution", "layer_seed"}:
+        if getattr(settings, name) != getattr(usual, name):
+            raise ValueError(
+                f"{source.name}: {name} is set to {getattr(settings, name)}; expected no such "
+                "setting, for the photograph tells it. Leave it out."
+            )
 
 
 def layer_spec(settings: LayerSettings) -> LayerSpec:
@@ -99,10 +115,34 @@ def _layer_pictures(dataset: xr.Dataset) -> Pictures:
 
 
 def _coverage_error(version: StoredVersion) -> float | None:
+    """None of a photograph's: its layers have no setting."""
     from pipelines.glass_scratches.figures import coverage_error
 
+    if version.input("scratch_photo").sizes["layer"]:
+        return None
     settings = LayerSettings(**version.record["settings"])
     return coverage_error(version.dataset["coverage"].values, layer_spec(settings))
+
+
+def _likeness(version: StoredVersion) -> Likeness | None:
+    """None where there is no photograph."""
+    from assets_defs.glass_scratches.datasets import photograph_scratches_of
+    from pipelines.glass_scratches.photograph.figures import photograph_likeness
+
+    scratches = photograph_scratches_of(version.input("scratch_photo"))
+    if scratches is None:
+        return None
+    return photograph_likeness(scratches, version.dataset["coverage"].values)
+
+
+def _photo_direction_error(version: StoredVersion) -> float | None:
+    likeness = _likeness(version)
+    return None if likeness is None else likeness.direction_error
+
+
+def _photo_coverage_ratio(version: StoredVersion) -> float | None:
+    likeness = _likeness(version)
+    return None if likeness is None else likeness.coverage_ratio
 
 
 def _map_z(version: StoredVersion) -> float:
@@ -117,6 +157,7 @@ def _map_z(version: StoredVersion) -> float:
     schemas.SCRATCH_LAYERS,
     by=("setting",),
     settings=LayerSettings,
+    inputs=("scratch_photo",),
     pictures=_layer_pictures,
     checks=(
         Check(
@@ -132,19 +173,36 @@ def _map_z(version: StoredVersion) -> float:
             _map_z,
             at_most=2.0,
         ),
+        Check(
+            "photo_direction_error",
+            "Degrees that scratches found in a picture of the layers are turned against the "
+            "photograph's, on average (earth mover's distance).",
+            _photo_direction_error,
+            at_most=10.0,
+        ),
+        Check(
+            "photo_coverage_ratio",
+            "Area times contrast of scratches found in a picture of the layers, over the "
+            "photograph's.",
+            _photo_coverage_ratio,
+            at_least=0.6,
+            at_most=1.6,
+        ),
     ),
 )
-def scratch_layers(settings: LayerSettings) -> Result:
-    """Scatter the scratches and map their coverage."""
-    from assets_defs.glass_scratches.datasets import layers_dataset
+def scratch_layers(settings: LayerSettings, scratch_photo: xr.Dataset) -> Result:
+    """Scatter the scratches, of the settings or like a photograph's, and map their coverage."""
+    from assets_defs.glass_scratches.datasets import layers_dataset, photograph_scratches_of
     from pipelines.glass_scratches.layers.coverage import coverage_maps
     from pipelines.glass_scratches.layers.pictures import layer_stages
     from pipelines.glass_scratches.layers.scratch_layers import make_layers
+    from pipelines.glass_scratches.photograph.photograph_layers import layers_like
 
-    spec = layer_spec(settings)
-    layers = make_layers(spec, settings.layer_seed)
+    spec, seed = layer_spec(settings), settings.layer_seed
+    scratches = photograph_scratches_of(scratch_photo)
+    layers = make_layers(spec, seed) if scratches is None else layers_like(scratches, seed)
     maps = coverage_maps(layers, settings.resolution, MAP_SAMPLES)
-    dataset = layers_dataset(layers, maps, layer_stages(spec, settings.layer_seed, _STAGE_SIZE))
+    dataset = layers_dataset(layers, maps, layer_stages(spec, seed, _STAGE_SIZE))
     return dataset, {
         "scratches": len(layers.features.layer),
         "bytes of the scratches": layers.angle.nbytes + sum(f.nbytes for f in layers.features),

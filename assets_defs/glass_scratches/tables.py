@@ -166,6 +166,20 @@ def _method_suits_walls(sources: Mapping[str, Source], settings: Mapping[str, Se
                 f"roughness is {table.roughness:g} with the paper's walls; expected 1, or walls of "
                 "glass."
             )
+        if table.walls == "glass" and "setting" in sources:
+            _check_walls(sources["setting"], settings["scratch_profile"], table)
+
+
+def _check_walls(source: Source, profile: Settings, table: TableSettings) -> None:
+    """Raises ValueError for a cross-section that grooves of glass cannot have side by side."""
+    from assets_defs.glass_scratches.profile_files import load_profile
+    from pipelines.glass_scratches.tables.glass_table import table_walls
+
+    points, _ = load_profile(source, profile.model_dump())
+    try:
+        table_walls(points, table.roughness, table.table_seed)
+    except ValueError as error:
+        raise ValueError(f"{source.name}: {error}") from error
 
 
 def _table_pictures(dataset: xr.Dataset) -> Pictures:

@@ -86,6 +86,34 @@ SCRATCH_TABLE = Schema(
     },
 )
 
+_SEGMENT = ("segment",)
+
+SCRATCH_PHOTO = Schema(
+    _SYSTEM,
+    "scratch_photo",
+    1,
+    "Scratches found in a photograph of scratched glass, by layers. Empty for a setting that is no "
+    "photograph. Pixels: x to the right, y downwards.",
+    {
+        "luminance": Variable(("row", "column"), "float32", "1", "The photograph, linear"),
+        "centre": Variable((*_SEGMENT, "axis"), "float64", "pixel", "Middle of the scratch"),
+        "direction": Variable(
+            _SEGMENT, "float64", "radian", "From x towards up, at the middle, in [0, pi)"
+        ),
+        "length": Variable(_SEGMENT, "float64", "pixel", "Its length"),
+        "width": Variable(
+            _SEGMENT, "float64", "pixel", "Of a bar with its peak and area, the blur included"
+        ),
+        "contrast": Variable(
+            _SEGMENT, "float64", "1", "Difference from its ground over the ground, without sign"
+        ),
+        "turn": Variable(_SEGMENT, "float64", "radian", "From end to end, positive to the left"),
+        "strength": Variable(_SEGMENT, "float64", "1", "Contrast over a full scratch's, at most 1"),
+        "segment_layer": Variable(_SEGMENT, "int32", "1", "Its layer"),
+        "angle": Variable(("layer",), "float32", "radian", "Direction of a layer's scratches"),
+    },
+)
+
 SCRATCH_LAYERS = Schema(
     _SYSTEM,
     "scratch_layers",
@@ -205,6 +233,7 @@ SCHEMAS = (
     SCRATCH_PROFILE,
     SCRATCH_TABLE_2D,
     SCRATCH_TABLE,
+    SCRATCH_PHOTO,
     SCRATCH_LAYERS,
     GLASS_OBJECT,
     GLASS_FRAMES,

@@ -90,10 +90,11 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         "scratch_profile": set(),
         "scratch_table_2d": {"scratch_profile"},
         "scratch_table": {"scratch_table_2d"},
-        "scratch_layers": set(),
+        "scratch_photo": set(),
+        "scratch_layers": {"scratch_photo"},
         "glass_object": set(),
         "glass_frames": {"scratch_table_2d", "scratch_table", "scratch_layers", "glass_object"},
-        "glass_package": set(SCRATCHES.plans) - {"glass_package"},
+        "glass_package": set(SCRATCHES.plans) - {"glass_package", "scratch_photo"},
     }
     assert _parents(house, SSDF) == {
         "scene_mesh": set(),

@@ -9,24 +9,31 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from assets_defs.glass_scratches.graph import SCRATCHES
 from assets_defs.glass_scratches.layers import LayerSettings, layer_spec
+from assets_defs.glass_scratches.photograph_files import load_scratches
 from assets_defs.launcher import Request
 from assets_defs.sources import Source
 from pipelines.drawing import colour
+from pipelines.drawing.colour import to_8bit
 from pipelines.geometry import solid_shapes
 from pipelines.glass_scratches.drawing import frames, live_parts, stage_view
 from pipelines.glass_scratches.layers import coverage, features, scratch_layers
+from pipelines.glass_scratches.photograph import photograph_layers
 from pipelines.glass_scratches.tables import fresnel, glass_table, profiles, scratch_table
 from pipelines.glass_scratches.tables import lobe as lobes
 from pipelines.glass_scratches.tables.radiosity import equation_1
 from storage.packages import encoding
 from tests.assets_defs.regressions import Regression, assert_check_finds
+from tests.pipelines.glass_scratches.photographs import SPEC, photograph
 
 SETTING = {"setting": "setting-2"}
 PAPER = {"setting": "setting-1"}
 """With the paper's walls."""
+PHOTO = {"setting": "pane-png"}
+"""A photograph."""
 PLATE = {"object": "plate"}
 KEYS = SETTING | PLATE
 TINY = {"size": 32, "samples": 2, "lights": 1, "moving_size": 32}
@@ -37,6 +44,11 @@ def good(house: Any) -> Any:
     """The house with a diffuse and a clear setting made once, and one with the paper's walls."""
     house.launcher.launch(Request(SCRATCHES, [KEYS, {"setting": "clear"}], preset="test"))
     house.launcher.launch(Request(SCRATCHES, [PAPER], preset="test", given={"walls": "paper"}))
+    _, light = photograph(SPEC, 1)
+    inbox = house.workspace.inbox(SCRATCHES.name)
+    inbox.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(to_8bit(2 * np.repeat(light[..., None], 3, axis=2))).save(inbox / "pane.png")
+    house.launcher.launch(Request(SCRATCHES, [PHOTO], preset="test", given={"resolution": 256}))
     return house
 
 
@@ -260,6 +272,20 @@ def _inside_out(right: Callable[..., Any], *arguments: Any) -> Any:
     return places, shading, -facing
 
 
+def _short_scratches(right: Callable[..., Any], contrast: Any) -> Any:
+    found = right(contrast)
+    return found._replace(segments=found.segments._replace(length=2 * found.segments.width))
+
+
+def _turned(right: Callable[..., Any], scratches: Any, seed: int) -> Any:
+    of = scratches.segments
+    return right(scratches._replace(segments=of._replace(angle=of.angle + 0.5)), seed)
+
+
+def _slight(right: Callable[..., Any], scratches: Any, seed: int) -> Any:
+    return right(scratches._replace(strength=0.4 * scratches.strength), seed)
+
+
 REGRESSIONS = (
     Regression("aspect", profiles, "cut_profile", _deeper, SETTING),
     Regression("aspect", profiles, "cut_profile", _nanometres_as_micrometres, SETTING),
@@ -279,6 +305,9 @@ REGRESSIONS = (
     Regression("interpolation_error", fresnel, "fresnel_factors", _other_exponent, PAPER),
     Regression("largest_share", lobes, "make_lobe", _generous_sampler, SETTING),
     Regression("coverage_error", scratch_layers, "make_layers", _wide_scratches, SETTING),
+    Regression("slenderness", photograph_layers, "find_segments", _short_scratches, PHOTO),
+    Regression("photo_direction_error", photograph_layers, "layers_like", _turned, PHOTO),
+    Regression("photo_coverage_ratio", photograph_layers, "layers_like", _slight, PHOTO),
     Regression("map_z", coverage, "coverage_maps", _moved_map, SETTING),
     Regression("edge_error", solid_shapes, "plate", _holed, PLATE),
     Regression("volume", solid_shapes, "plate", _smaller, PLATE),
@@ -325,6 +354,28 @@ REGRESSIONS = (
     Regression("mismatches", stage_view, "corners_apart", _inside_out, KEYS),
     Regression("mismatches", encoding, "ktx2_bytes", lambda right, it: right(it[:, ::-1]), KEYS),
 )
+
+
+def test_a_photographs_layers_are_stored_with_what_it_does_not_tell(good: Any) -> None:
+    photo, layers = (_open(good, name, PHOTO) for name in ("scratch_photo", "scratch_layers"))
+    assert photo.sizes["segment"] > 30
+    np.testing.assert_array_equal(layers["angle"], photo["angle"])
+    assert float(layers["coverage"].sum("layer").mean()) == pytest.approx(0.06, rel=0.3)
+    assert _open(good, "scratch_photo", SETTING).sizes["segment"] == 0
+    assert _open(good, "scratch_profile", PHOTO).attrs["name"] == "pane.png"
+
+
+def test_a_look_that_the_photograph_tells_is_not_set(good: Any) -> None:
+    with pytest.raises(ValueError, match=r"pane\.png: digs is set to 0\.5; expected no such"):
+        good.launcher.launch(Request(SCRATCHES, [PHOTO], given={"digs": 0.5}))
+
+
+def test_a_photograph_without_scratches_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).normal(120.0, 3.0, (128, 128))
+    Image.fromarray(noise.astype(np.uint8)).save(tmp_path / "clean.png")
+    sentence = r"clean\.png: number of scratches is 0 lines .*; expected 8 or more, .* set crop"
+    with pytest.raises(ValueError, match=sentence):
+        load_scratches(Source.of(tmp_path / "clean.png"), {})
 
 
 def test_every_check_has_a_planted_regression() -> None:

@@ -32,8 +32,8 @@ BAND = 4
 LEAST = 0.05
 """Part of a beam that a band gets at least, to be compared."""
 _SHARP = 0.2
-"""Part of a band's light in the bins at its borders, at most, of clear walls: a beam that the border
-of a band cuts is measured badly. Ground walls have no beams so narrow."""
+"""Part of a band's light in the bins at its borders, at most, of clear walls: a beam that the
+border of a band cuts is measured badly. Ground walls have no beams so narrow."""
 PATHS = 1 << 17
 _PARTS = 128
 """Of a view's bin, which is looked at from a direction drawn at random in each of them."""

@@ -20,7 +20,7 @@ from pipelines.glass_scratches.tables.glass_radiosity import (
     factors_of_both_sides,
     solve_glass,
 )
-from pipelines.glass_scratches.tables.groove_walls import groove_walls
+from pipelines.glass_scratches.tables.groove_walls import GrooveWalls, groove_walls
 from pipelines.glass_scratches.tables.monte_carlo import PLACES
 from pipelines.glass_scratches.tables.walls import Method, check_roughness, table_method
 
@@ -32,6 +32,14 @@ _FINE = 16
 _CLOSED = 1e-13
 _ROUNDS = 10_000
 _FITS = 20
+
+
+def table_walls(profile: NDArray[np.float64], roughness: float, seed: int = 0) -> GrooveWalls:
+    """The walls that a table of this roughness is of; those that scatter evenly have no ridges.
+
+    Raises ValueError as `groove_walls` for a profile (P, 2) that cannot have them.
+    """
+    return groove_walls(profile, 0.0 if roughness == 1.0 else STEEPEST * roughness, seed)
 
 
 def glass_table(
@@ -69,7 +77,7 @@ def glass_table(
     even = roughness == 1.0
     if table_method(method, roughness) == "exact":
         return _even_table(profile, bins, index, albedo, facets)
-    walls = groove_walls(profile, 0.0 if even else STEEPEST * roughness, seed)
+    walls = table_walls(profile, roughness, seed)
     tables = []
     leans = (0.0,) if even else (*LEANS, 1.0)
     for number, lean in enumerate(leans):

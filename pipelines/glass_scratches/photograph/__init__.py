@@ -1,0 +1,1 @@
+"""Scratches that a photograph of scratched glass shows, and layers like them."""
