@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
@@ -203,12 +204,10 @@ def ssdf_basis(
     else:
         coded = _compact_form(settings, triangle_clusters)
     progress(0.8)
-    n, raw = math.isqrt(ssdf_matrix.sizes["direction"]), ssdf_matrix["distances"].size * 4
-    errors = figures.compression_errors(
-        distance_blocks(ssdf_matrix),
-        lambda rows: coded.decoder.distances_in(rows, n),
-        scene_mesh["normals"].values,
-    )
+    raw = ssdf_matrix["distances"].size * 4
+    decode = partial(coded.decoder.distances_in, n=math.isqrt(ssdf_matrix.sizes["direction"]))
+    blocks, normals = distance_blocks(ssdf_matrix), scene_mesh["normals"].values
+    errors = figures.compression_errors(blocks, decode, normals)
     counts = {"raw": raw, "file": coded.file_bytes, "memory": coded.memory_bytes}
     return basis_dataset(coded.variables, counts, errors), {
         **coded.shown,

@@ -66,8 +66,8 @@ def photograph_scratches(luminance: NDArray[np.floating]) -> PhotographScratches
     Raises ValueError where too few lines stand out of their ground, or lines cover so much that
     they are a texture: what was found, without a full stop.
 
-    >>> ground = np.full((96, 96), 0.2)
-    >>> for k in range(10): ground[8 + 8 * k : 10 + 8 * k, 10:80] = 0.3
+    >>> ground = 0.2 + 0.002 * np.random.default_rng(0).standard_normal((128, 128))
+    >>> for k in range(10): ground[9 + 12 * k : 11 + 12 * k, 16 + 3 * k : 80 + 3 * k] += 0.1
     >>> photograph_scratches(ground).angle.shape
     (1,)
     """
