@@ -158,8 +158,8 @@ class VersionedStore:
 
         ``record`` must hold ``settings``, ``recipe`` and ``checks``, the names of the blocking
         checks; with none of them the version becomes current at once. Content that equals the
-        current version's under equal settings adds no version. Raises StoreFullError, StoreError;
-        then nothing that was stored has changed.
+        current version's under equal settings, from the same assets, adds no version. Raises
+        StoreFullError, StoreError; then nothing that was stored has changed.
         """
         version = self._new_name(slot)
         files = self.files(slot)
@@ -207,10 +207,13 @@ class VersionedStore:
         return written
 
     def _is_equal(self, slot: Slot, version: str, record: Mapping[str, Any]) -> bool:
-        """Whether a version is undamaged and has the same content under the same settings."""
+        """Whether a version is undamaged and has the same content under the same settings, made
+        from the same assets: checks read these by name, which newer code may ask for."""
         try:
             now = self.record(slot, version)
             if any(now[name] != record[name] for name in ("content", "settings")):
+                return False
+            if _assets_of(now) != _assets_of(record):
                 return False
             zarr_files.verify(self.folder(slot, version))
         except StoreError:
@@ -380,3 +383,8 @@ class VersionedStore:
             before = datetime.strptime(newest.partition("-")[0], _STAMP)
             now = max(now, before + timedelta(microseconds=1))
         return f"{now:{_STAMP}}-{uuid.uuid4().hex[:8]}"
+
+
+def _assets_of(record: Mapping[str, Any]) -> set[str]:
+    """Names of the assets that a version was made from."""
+    return {entry["asset"] for entry in record.get("inputs", ())}

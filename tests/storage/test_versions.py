@@ -263,6 +263,19 @@ def test_other_settings_add_a_version_of_equal_content(
     assert store.current(slot) == other.version
 
 
+def test_equal_content_made_from_other_assets_adds_a_version(
+    store: VersionedStore, slot: Slot, make_record: MakeRecord
+) -> None:
+    """What newer code's checks ask the version for has to be there."""
+    mesh = {"asset": "mesh", "partition": "p", "version": "1", "content": "c"}
+    first = store.write(slot, _holding(1), make_record())
+    more = store.write(slot, _holding(1), make_record() | {"inputs": [mesh]})
+    assert more.is_new
+    assert more.content == first.content
+    newer = mesh | {"version": "2"}
+    assert not store.write(slot, _holding(1), make_record() | {"inputs": [newer]}).is_new
+
+
 def test_other_data_add_a_version_of_other_content(
     store: VersionedStore, slot: Slot, make_record: MakeRecord
 ) -> None:
