@@ -59,7 +59,7 @@ SHOWN: dict[System, dict[str, tuple[str, ...]]] = {
         "setting": SCRATCHES.dimension("setting").builtin,
         "object": SCRATCHES.dimension("object").builtin,
     },
-    SSDF: {"scene": ("teapot", "court"), "environment": ("sky", "lamps")},
+    SSDF: {"scene": ("teapot", "court"), "environment": ("sky", "lamps", "room")},
     STREET: {"drive": ("city",)},
 }
 """Keys by dimension of what the pictures show."""
@@ -116,7 +116,7 @@ def _lighting(store: VersionedStore) -> None:
     keys = {"scene": "teapot", "environment": "sky"}
     _row(
         "ssdf-lit.jpg",
-        _shown(store, SSDF, "relit_frames", keys, "lit"),
+        _shown(store, SSDF, "relit_frames", keys | {"environment": "room"}, "lit"),
         _shown(store, SSDF, "relit_frames", keys | {"scene": "court"}, "lit"),
         _shown(store, SSDF, "relit_frames", keys, "clusters"),
     )

@@ -155,7 +155,7 @@ def _light(settings: LightSettings, source: Source) -> EnvironmentFile:
     if source.path is not None:
         return read_environment(source.path)
     if source.key == "room":
-        made = room(_HEIGHT)
+        made = room(_STORED)  # it is looked at
     elif source.key == "sky":
         made = sky(_HEIGHT, sun_azimuth=settings.sun_azimuth, sun_elevation=settings.sun_elevation)
     else:
