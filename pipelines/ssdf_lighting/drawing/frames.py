@@ -15,6 +15,7 @@ from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
 from pipelines.light.environment_lookup import radiance_from_directions
 from pipelines.ssdf_lighting.drawing.bounced_light import BouncedLight
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
+from pipelines.ssdf_lighting.drawing.denoising import denoised
 from pipelines.ssdf_lighting.drawing.light_sources import LightSource, ProbeSource
 from pipelines.ssdf_lighting.drawing.pictures import cluster_colours
 from pipelines.ssdf_lighting.drawing.ray_tracing import Traced, ray_traced
@@ -112,7 +113,7 @@ class RelitFrames(NamedTuple):
 
     frames: (frames, H, W, 3), with light that surfaces reflect.
     uncompressed, direct, reference: the first of them of the SSDFs before compression; without
-    reflected light; and that by rays under the environment itself.
+    reflected light; and that by rays under the environment itself, denoised.
     exposure: what radiance was multiplied by. turning: the frames' radiance, times and renderer.
     """
 
@@ -173,6 +174,7 @@ def relit_frames(
         samples,
         progress=lambda fraction: progress(0.4 + 0.6 * fraction),
     ).radiance
+    traced = denoised(reference[..., :3], split_by_part(scene).mesh, camera, size)
     behind = np.stack([seen_behind(light.environment, camera, size, turn) for turn in turns])
     plain = np.array(BACKGROUND, np.float32)
     scale = scene_exposure(turning)
@@ -185,7 +187,7 @@ def relit_frames(
         shown(turning, behind),
         shown(exact, behind[:1])[0],
         shown(direct, behind[:1])[0],
-        exposed(reference[..., :3] + behind[0] * (reference[..., 3:] == 0), scale),
+        exposed(np.where(reference[..., 3:] > 0, traced, behind[0]), scale),
         scale,
         turning,
     )
