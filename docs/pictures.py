@@ -196,17 +196,25 @@ def _scratches(store: VersionedStore) -> None:
         "scratches-layers.png",
         *(shown("scratch_layers", "stages", setting) for setting in ("setting-2", "worn")),
     )
-    _row("scratches-frames.png", overview["plate-far"], overview["plate-close"])
-    _row("scratches-denoised.png", *_denoised(store))
+    _row("scratches-frames.jpg", _far_above_close(store, "plate"), height=2 * _HEIGHT)
+    _row("scratches-denoised.jpg", *_denoised(store))
     _row("scratches-photograph.png", *_photograph())
     _row("scratches-room.jpg", _room())
-    _row("scratches-teapot.png", overview["teapot-far"], _beside_stage(store))
-    _row("scratches-walls.png", overview["plate-diffuse-to-clear"])
+    _row("scratches-teapot.jpg", _far_above_close(store, "teapot"), height=2 * _HEIGHT)
+    _row("scratches-stage.jpg", _beside_stage(store))
+    _row("scratches-walls.jpg", overview["plate-diffuse-to-clear"])
     _moving("scratches-light.webp", overview["plate-moving-light"])
 
 
 def _glass(store: VersionedStore, name: str, keys: dict[str, str]) -> NDArray[np.uint8]:
     return _shown(store, SCRATCHES, "glass_frames", keys, name)
+
+
+def _far_above_close(store: VersionedStore, name: str) -> NDArray[np.uint8]:
+    """An object in all settings, side by side."""
+    settings = SHOWN[SCRATCHES]["setting"]
+    both = (_glass(store, "frames", {"object": name, "setting": each}) for each in settings)
+    return np.hstack([np.vstack(np.split(pair, 2, axis=1)) for pair in both])
 
 
 def _furnace(store: VersionedStore) -> NDArray[np.uint8]:
@@ -273,15 +281,15 @@ def _column(name: str, *pictures: NDArray[np.uint8]) -> None:
     Image.fromarray(np.vstack(pictures)).save(FOLDER / name, optimize=True)
 
 
-def _row(name: str, *pictures: NDArray[np.uint8]) -> None:
+def _row(name: str, *pictures: NDArray[np.uint8], height: int = _HEIGHT) -> None:
     """Pictures side by side, equally high, on white."""
     scaled = []
     for picture in pictures:
         image = Image.fromarray(picture)
-        width = round(image.width * _HEIGHT / image.height)
-        scaled.append(image.resize((width, _HEIGHT), Image.Resampling.LANCZOS))
+        width = round(image.width * height / image.height)
+        scaled.append(image.resize((width, height), Image.Resampling.LANCZOS))
     width = sum(image.width for image in scaled) + _GAP * (len(scaled) - 1)
-    row = Image.new("RGB", (width, _HEIGHT), "white")
+    row = Image.new("RGB", (width, height), "white")
     left = 0
     for image in scaled:
         row.paste(image, (left, 0))
