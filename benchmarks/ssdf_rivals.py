@@ -26,17 +26,11 @@ from numpy.typing import NDArray
 from assets_defs.ssdf_lighting.datasets import scene_of, shared_basis_of, visible_of
 from pipelines.geometry.rays import build_scene
 from pipelines.ssdf_lighting.compression import compact as coding
-from pipelines.ssdf_lighting.compression.bits_file import (
-    CodedBits,
-    bits_from_bytes,
-    bits_to_bytes,
-    resident_of_bits,
-)
-from pipelines.ssdf_lighting.compression.compact_file import from_bytes, to_bytes
+from pipelines.ssdf_lighting.compression.bits_file import CodedBits, bits_to_bytes
+from pipelines.ssdf_lighting.compression.compact_file import to_bytes
 from pipelines.ssdf_lighting.compression.decoder import Decoder
 from pipelines.ssdf_lighting.compression.entropy_coding import decode, encode
 from pipelines.ssdf_lighting.compression.lookup import matrix_along
-from pipelines.ssdf_lighting.compression.resident import resident_tables
 from pipelines.ssdf_lighting.compression.triangle_clusters import clusters_by_position
 from pipelines.ssdf_lighting.compression.visibility_bits import (
     decode_visibility,
@@ -190,17 +184,16 @@ class _Rows:
         self.relit = relit
 
     def of_file(self, file: bytes) -> dict[str, Any]:
-        """Of a file in the compact form."""
-        begin = time.perf_counter()
-        codes = from_bytes(file)
-        resident_tables(codes)
-        seconds = time.perf_counter() - begin
+        """Of a file in either version."""
         decoder = Decoder.of_file(file)
+        begin = time.process_time()
+        resident = decoder.resident_bytes
+        seconds = time.process_time() - begin
         return {
             "file_bytes": len(file),
-            "resident_bytes": decoder.resident_bytes,
+            "resident_bytes": resident,
             "decode_s": seconds,
-            "multiplications": 4.0 * (1.0 + len(codes.weights) / len(codes.cluster)),
+            "multiplications": 4.0 * (1.0 + len(decoder.tables.weights) / len(self.cluster)),
             **self.relit(decoder.distances_along),
             "irradiance_db": irradiance_db(self.judged, decoder.distances_along),
         }
@@ -211,20 +204,9 @@ class _Rows:
             self.matrix[k : k + _REBUILT].values for k in range(0, len(self.visible), _REBUILT)
         )
         seen = np.concatenate([visible_at(block, n) for block in blocks])
-        file = bits_to_bytes(CodedBits(seen, self.cluster.astype(np.int32)), self.scene.triangles)
         rebuilt_distances(seen[:1])  # compiles it
-        begin = time.process_time()
-        resident_of_bits(bits_from_bytes(file))
-        seconds = time.process_time() - begin
-        decoder = Decoder.of_file(file)
-        return {
-            "file_bytes": len(file),
-            "resident_bytes": decoder.resident_bytes,
-            "decode_s": seconds,
-            "multiplications": 4.0 * (1.0 + len(decoder.tables.weights) / len(seen)),
-            **self.relit(decoder.distances_along),
-            "irradiance_db": irradiance_db(self.judged, decoder.distances_along),
-        }
+        coded = CodedBits(seen, self.cluster.astype(np.int32))
+        return self.of_file(bits_to_bytes(coded, self.scene.triangles))
 
     def of_bytes(self, labels: NDArray[np.integer], budget: int) -> dict[str, Any]:
         """Of other clusters, at about the same bytes."""
@@ -363,8 +345,7 @@ def _open_sky(vertices: NDArray[np.int64], axes: NDArray[np.float32]) -> NDArray
 
 
 def _at_equal_error(rows: _Rows, table: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Bytes of the bits over ours, at the coarsest of ours whose irradiance is not worse; with
-    `_chosen`, ours may be a file of bits, too."""
+    """Bytes of the bits over ours, at the coarsest of ours whose irradiance is not worse."""
     cluster = rows.cluster.astype(np.int32)
     factors = coding.cluster_factors(rows.basis, cluster)
     count = rows.basis.coordinates.shape[0] * rows.basis.vectors.shape[0]
@@ -384,11 +365,4 @@ def _at_equal_error(rows: _Rows, table: dict[str, dict[str, Any]]) -> dict[str, 
         fit = [row for row in tried if row["irradiance_db"] >= table[rival]["irradiance_db"]]
         ours = min((row["file_bytes"] for row in fit), default=None)
         found[f"bits_bytes_ratio{name}"] = ours and table[rival]["file_bytes"] / ours
-        fit += [
-            row
-            for row in (table[f"bits_coding_{n}"] for n in _BITS_ROWS)
-            if row["irradiance_db"] >= table[rival]["irradiance_db"]
-        ]
-        ours = min((row["file_bytes"] for row in fit), default=None)
-        found[f"bits_bytes_ratio{name}_chosen"] = ours and table[rival]["file_bytes"] / ours
     return found

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 def load_profile(source: Source, settings: Mapping[str, Any]) -> Measured:
     """A cross-section with the settings of ``scratch_profile``, the built-in one for a photograph,
-    which tells none; what was mended or left out of a
-    user's file is in its notes. Raises ValueError, BadInput for one that is none."""
+    which tells none; what was mended or left out of a user's file is in its notes. Raises
+    ValueError, BadInput for one that is none."""
     from pipelines.glass_scratches.tables.profiles import built_in_profile
     from pipelines.glass_scratches.tables.scans import Measured, measured_profile
     from storage.readers.profiles import read_profile

@@ -256,11 +256,11 @@ def decoder_of(ssdf_basis: xr.Dataset) -> Decoder:
 def packed_basis(ssdf_basis: xr.Dataset, triangle_clusters: xr.Dataset) -> xr.Dataset:
     """`ssdf_basis` as a package holds it, for readers that rebuild nothing: instead of bits, the
     compact form with the error that what is rebuilt from them has."""
-    from pipelines.ssdf_lighting.compression.bits_file import VERSION
     from pipelines.ssdf_lighting.compression.compact import quantise_to_rmse
     from pipelines.ssdf_lighting.compression.compact_file import to_bytes
+    from pipelines.ssdf_lighting.compression.decoder import holds_bits
 
-    if "file" not in ssdf_basis or ssdf_basis["file"].values[8] != VERSION:
+    if "file" not in ssdf_basis or not holds_bits(ssdf_basis["file"].values.tobytes()):
         return ssdf_basis
     basis, rmse = shared_basis_of(triangle_clusters), float(ssdf_basis["rmse"])
     codes = quantise_to_rmse(basis, dense_clusters(triangle_clusters), rmse)

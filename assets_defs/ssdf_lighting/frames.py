@@ -146,7 +146,7 @@ def _coverage(version: StoredVersion) -> float:
         Check(
             "probe_psnr",
             "PSNR of direct light against rays under the environment itself, denoised, scene "
-            "pixels, dB; even light has 13.",
+            "pixels, dB; even light has 11 to 19.",
             _probe_psnr,
             at_least=20.0,
             change=0.5,

@@ -21,8 +21,6 @@ from pipelines.ssdf_lighting.compression.resident import ResidentTables, residen
 
 Floats = NDArray[np.float32]
 DistancesAlong = Callable[[NDArray[np.integer], Floats], Floats]
-_BITS = struct.pack("<H", 2)
-"""The version of files that hold bits, as it stands in them."""
 
 
 class Decoder:
@@ -56,7 +54,7 @@ class Decoder:
         Of version 2, bits, whole rows are what is drawn from, too, in its directions. Distances
         raise ValueError for what is no such file.
         """
-        if data[8:10] == _BITS:
+        if holds_bits(data):
             return cls(lambda: tables_of_resident(_rebuilt(data)), lambda: _rebuilt(data))
 
         def tables() -> DecoderTables:
@@ -123,6 +121,11 @@ class Decoder:
         if isinstance(kept, ResidentTables):
             return functools.partial(resident_along, kept)
         return functools.partial(decoded_along, kept)
+
+
+def holds_bits(data: bytes) -> bool:
+    """Whether a file is in version 2 of docs/ssdf_file.md: bits in place of distances."""
+    return data[8:10] == struct.pack("<H", 2)
 
 
 @functools.lru_cache(maxsize=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from pipelines.drawing.colour import auto_exposure, to_8bit
 from pipelines.drawing.stage import PAINTED, Camera, Stage, surface
 from pipelines.light.environment_lookup import radiance_from_directions
+from pipelines.light.environment_maps import rotate_environment
 from pipelines.ssdf_lighting.drawing.bounced_light import BouncedLight
 from pipelines.ssdf_lighting.drawing.camera_rays import camera_rays, pixel_centres
 from pipelines.ssdf_lighting.drawing.denoising import denoised
@@ -194,16 +194,12 @@ def relit_frames(
 
 
 def seen_behind(
-    environment: NDArray[np.floating], camera: Camera, size: tuple[int, int], turn: float
+    environment: NDArray[np.float32], camera: Camera, size: tuple[int, int], turn: float
 ) -> NDArray[np.float32]:
     """Radiance (height, width, 3) of what stands behind a scene: an environment (H, 2 H, 3) turned
     by degrees about up, as its lights are."""
     _, ways = camera_rays(camera, size, pixel_centres(size))
-    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-    back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    found = radiance_from_directions(
-        np.ascontiguousarray(environment, np.float32), ways @ back.T, smooth=True
-    )
+    found = radiance_from_directions(rotate_environment(environment, turn), ways, smooth=True)
     return found.reshape(size[1], size[0], 3)
 
 
