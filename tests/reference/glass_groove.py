@@ -37,9 +37,9 @@ border of a band cuts is measured badly. Ground walls have no beams so narrow.""
 PATHS = 1 << 17
 _PARTS = 128
 """Of a view's bin, which is looked at from a direction drawn at random in each of them."""
-_BESIDE = 6
-"""Grooves to each side of those that are looked at."""
-_REACH = 40.0
+_BESIDE = 60
+"""Grooves to each side of those that are looked at: at the grazing bins paths cross many of them."""
+_REACH = 400.0
 """Length of the walls to each side, in widths of a groove."""
 _TEXELS = 16
 """Of the environment a bin: it is linear between them."""
