@@ -38,7 +38,7 @@ PATHS = 1 << 17
 _PARTS = 128
 """Of a view's bin, which is looked at from a direction drawn at random in each of them."""
 _BESIDE = 60
-"""Grooves to each side of those that are looked at: at the grazing bins paths cross many of them."""
+"""Grooves to each side of those that are looked at: grazing paths cross many of them."""
 _REACH = 400.0
 """Length of the walls to each side, in widths of a groove."""
 _TEXELS = 16
