@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,17 @@ _PIXELS = ("y", "x", "channel")
 
 
 # ---- drives ----------------------------------------------------------------------------------
+
+
+class PosePoints(NamedTuple):
+    """What poses were found or adjusted by."""
+
+    points: NDArray[np.float64]
+    """(p, 3), metres."""
+    colours: NDArray[np.uint8]
+    """(p, 3), sRGB."""
+    focal_deviation: NDArray[np.float64]
+    """(c,), pixels; 0 where the focal length was given."""
 
 
 def stacked_by_frame(
@@ -54,35 +65,75 @@ def stacked_by_frame(
     )
 
 
+def poses_dataset(
+    poses: NDArray[np.float64],
+    intrinsics: NDArray[np.float64],
+    distortion: NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    instant: NDArray[np.integer] | None = None,
+    origin: NDArray[np.float64] | None = None,
+    found: PosePoints | None = None,
+) -> xr.Dataset:
+    """`drive_poses` of poses (f, c, 4, 4) and lenses, with what they were found by, if anything.
+
+    instant: which of the drive's own, all if not given; origin: the world's zero.
+    """
+    import xarray as xr
+
+    frames, cameras = poses.shape[:2]
+    found = found or PosePoints(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.zeros(cameras))
+    return xr.Dataset(
+        {
+            "poses": (("frame", "camera", "row_4", "column_4"), poses),
+            "intrinsics": (("camera", "row", "column"), intrinsics),
+            "distortion": (("camera", "coefficient"), distortion),
+            "size": (("side",), np.array(size, np.int64)),
+            "instant": (("frame",), np.arange(frames) if instant is None else instant),
+            "origin": (("axis",), np.zeros(3) if origin is None else origin),
+            "points": (("point", "axis"), found.points),
+            "point_colours": (("point", "channel"), found.colours),
+            "focal_deviation": (("camera",), found.focal_deviation),
+        }
+    )
+
+
+def simulated_drive_of(poses: xr.Dataset) -> SimulatedDrive:
+    """The built-in drive that a `drive_poses` dataset is of."""
+    from pipelines.virtual.city.drive import SimulatedDrive
+
+    names = ("intrinsics", "poses", "exposure")
+    return SimulatedDrive(*(poses[name].values for name in names))
+
+
 def drive_dataset(
     photographs: NDArray[np.uint8] | da.Array,
     intrinsics: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    origin: NDArray[np.float64],
+    poses: xr.Dataset,
     held_out: NDArray[np.bool_],
 ) -> xr.Dataset:
-    """`drive_frames` of photographs (f, c, y, x, 3) and of what took them."""
+    """`drive_frames` of photographs (f, c, y, x, 3), their K and their `drive_poses`."""
     import xarray as xr
 
     return xr.Dataset(
         {
             "photographs": (("frame", "camera", *_PIXELS), photographs),
             "intrinsics": (("camera", "row", "column"), intrinsics),
-            "poses": (("frame", "camera", "row_4", "column_4"), poses),
-            "origin": (("axis",), origin),
+            "poses": poses["poses"],
+            "origin": poses["origin"],
             "held_out": (("frame",), held_out),
         }
     )
 
 
 def simulated_drive_dataset(
-    drive: SimulatedDrive,
+    poses: xr.Dataset,
     taken: DrivePhotographs,
     held_out: NDArray[np.bool_],
     offsets: Sequence[float],
 ) -> xr.Dataset:
     """`drive_frames` of the built-in drive, with what is true in frames held out."""
-    dataset = drive_dataset(taken.photographs, drive.intrinsics, drive.poses, np.zeros(3), held_out)
+    dataset = drive_dataset(taken.photographs, poses["intrinsics"].values, poses, held_out)
     return dataset.assign(
         truth_depth=(("held", "y", "x"), taken.truth_depth),
         truth_pole=(("held", "y", "x"), taken.truth_pole),

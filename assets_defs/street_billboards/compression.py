@@ -19,7 +19,7 @@ from assets_defs.street_billboards.datasets import (
     views_of,
 )
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.street_billboards.drive import metres_of
+from assets_defs.street_billboards.poses import metres_of
 from assets_defs.system import Pictures, Result
 from pipelines.street_billboards import figures
 from pipelines.street_billboards.billboards import HEADER_BYTES
@@ -55,7 +55,7 @@ def check_bytes(sources: Mapping[str, Source], settings: Mapping[str, Settings])
     each = _LEAST_BYTES
     if eigen["coding"] == "paper" and eigen["contribution"] is None:
         each = eigen["rank"] * (3 * 32 * 32 + 3 * 32) + 3 * 32
-    metres = metres_of(source, settings["drive_frames"])
+    metres = metres_of(source, settings["drive_poses"])
     least = int(metres * _LEAST_WIDTH / voxel**2) * each
     allowed = int(budget.model_dump()["byte_budget"])
     if least > allowed:

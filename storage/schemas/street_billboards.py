@@ -4,6 +4,46 @@ from storage.schemas.schema import Schema, Variable
 
 _SYSTEM = "street_billboards"
 
+DRIVE_POSES = Schema(
+    _SYSTEM,
+    "drive_poses",
+    1,
+    "Where a drive's cameras were, and through which lenses they looked.",
+    {
+        "poses": Variable(
+            ("frame", "camera", "row_4", "column_4"),
+            "float64",
+            "m",
+            "From the camera's axes (right, down, forward) to the world's, z up",
+        ),
+        "intrinsics": Variable(
+            ("camera", "row", "column"), "float64", "pixel", "K of the photographs as they are"
+        ),
+        "distortion": Variable(
+            ("camera", "coefficient"), "float64", "1", "k1, k2, p1, p2, k3, as OpenCV has them"
+        ),
+        "size": Variable(("side",), "int64", "pixel", "Width and height of the photographs"),
+        "instant": Variable(("frame",), "int64", "1", "Which of the drive's own instants"),
+        "origin": Variable(
+            ("axis",), "float64", "m", "Where the drive's own world has this one's zero"
+        ),
+        "points": Variable(
+            ("point", "axis"), "float64", "m", "What poses were found or adjusted by"
+        ),
+        "point_colours": Variable(("point", "channel"), "uint8", "1", "sRGB"),
+        "focal_deviation": Variable(
+            ("camera",), "float64", "pixel", "Standard deviation of a focal length; 0 where given"
+        ),
+        "exposure": Variable(
+            ("frame", "camera"),
+            "float64",
+            "1",
+            "Built-in drive: factors on linear light, about 1",
+            optional=True,
+        ),
+    },
+)
+
 DRIVE_FRAMES = Schema(
     _SYSTEM,
     "drive_frames",
@@ -270,6 +310,7 @@ STREET_PACKAGE = Schema(
 )
 
 SCHEMAS = (
+    DRIVE_POSES,
     DRIVE_FRAMES,
     DEPTH_MAPS,
     STREET_POINTS,

@@ -122,7 +122,8 @@ def test_the_graph_has_the_papers_shape(house: Any) -> None:
         },
     }
     assert _parents(house, STREET) == {
-        "drive_frames": set(),
+        "drive_poses": set(),
+        "drive_frames": {"drive_poses"},
         "depth_maps": {"drive_frames"},
         "street_points": {"drive_frames", "depth_maps"},
         "billboards": {"drive_frames", "street_points"},

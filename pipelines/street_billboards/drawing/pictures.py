@@ -38,6 +38,27 @@ def depth_picture(depth: NDArray[np.floating]) -> Picture:
     return np.where(known[..., None], colours, 0).astype(np.uint8)
 
 
+def way_picture(
+    places: NDArray[np.floating], points: NDArray[np.floating], colours: Picture
+) -> Picture:
+    """Places (f, c, 3) of a drive's cameras and points (p, 3) in their colours, from above."""
+    figure, canvas = new_figure(10, 5)
+    axes = figure.subplots()
+    step = max(len(points) // 200_000, 1)
+    axes.scatter(*points[::step, :2].T, c=colours[::step] / 255.0, s=0.6, linewidths=0)
+    for camera in range(places.shape[1]):
+        axes.plot(*places[:, camera, :2].T, ".-", color="tab:blue", linewidth=0.8, markersize=3)
+    axes.plot(*places[0, :, :2].T, "o", color="tab:green", markersize=6)
+    reach = np.ptp(places[..., :2].reshape(-1, 2), axis=0).max() * 0.6 + 20.0
+    middle = (places[..., :2].min(axis=(0, 1)) + places[..., :2].max(axis=(0, 1))) / 2
+    axes.set(
+        xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]) / 2
+    )
+    axes.set_aspect("equal")
+    axes.set(xlabel="x, m", ylabel="y, m", title="the way from above, and what it was found by")
+    return canvas_picture(canvas)
+
+
 def points_picture(positions: NDArray[np.floating], colours: Picture) -> Picture:
     """Points (n, 3) in their colours, from above and from the side."""
     step = max(len(positions) // 200_000, 1)

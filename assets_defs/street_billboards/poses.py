@@ -1,0 +1,139 @@
+"""Where the cameras were: `drive_poses`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from assets_defs.checks import Check
+from assets_defs.settings import Preset, Settings
+from assets_defs.sources import Source
+from assets_defs.street_billboards.capture_datasets import poses_dataset
+from assets_defs.street_billboards.declaration import STREET
+from assets_defs.system import NOTES, Pictures, Result
+from pipelines.street_billboards import figures
+from storage.readers.drives import Drive, frame_notes, read_drive
+from storage.schemas import street_billboards as schemas
+from storage.stored_version import StoredVersion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class PoseSettings(Settings):
+    """The simulated drive's way; of a drive of yours, which part."""
+
+    frames: int = Field(12, ge=8, le=10_000, description="Built-in drive: frames")
+    spacing: float = Field(3.0, gt=0, le=20, description="Built-in drive: metres between frames")
+    width: int = Field(640, ge=160, le=4096, description="Built-in drive: pixels across, 8:5")
+    view_angle: float = Field(75.0, ge=30, le=110, description="Built-in drive: degrees across")
+    baseline: float = Field(0.8, gt=0, le=3, description="Built-in drive: metres between cameras")
+    exposure_spread: float = Field(
+        0.12, ge=0, le=0.5, description="Built-in drive: how much exposures differ"
+    )
+    seed: int = Field(0, ge=0, description="Built-in drive: seed")
+    start: int = Field(0, ge=0, description="Your drive: first frame of this tile of it")
+    stop: int | None = Field(None, ge=8, description="Your drive: frame after the last")
+
+    sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
+        "test": {"frames": 9, "width": 256},
+        "paper": {"frames": 100},
+    }
+
+
+def metres_of(source: Source, settings: Settings) -> float:
+    """Length of a drive."""
+    given = settings.model_dump()
+    if source.path is None:
+        return float(given["frames"] * given["spacing"])
+    return figures.path_length(
+        read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
+    )
+
+
+def _pictures(dataset: xr.Dataset) -> Pictures:
+    from pipelines.street_billboards.drawing.pictures import way_picture
+
+    places = dataset["poses"].values[..., :3, 3]
+    return {"way": way_picture(places, dataset["points"].values, dataset["point_colours"].values)}
+
+
+def _frame_spacing(version: StoredVersion) -> float:
+    return figures.frame_spacing(version.dataset["poses"].values[:, 0, :3, 3])
+
+
+@STREET.asset(
+    schemas.DRIVE_POSES,
+    by=("drive",),
+    settings=PoseSettings,
+    from_source=True,
+    pictures=_pictures,
+    checks=(
+        Check(
+            "frame_spacing",
+            "Metres from frame to frame, median.",
+            _frame_spacing,
+            at_least=0.01,
+            at_most=20.0,
+            change=0.01,
+        ),
+    ),
+)
+def drive_poses(settings: PoseSettings, source: Source) -> Result:
+    """Take the drive's poses, or plan a drive through the simulated city."""
+    if source.path is not None:
+        return _given(read_drive(source.path), settings, source.name)
+    return _planned(settings)
+
+
+def _given(drive: Drive, settings: PoseSettings, name: str) -> Result:
+    """The poses of a part of a user's drive."""
+    from pipelines.street_billboards.capture.held_out import FEWEST_FRAMES
+
+    count = len(drive.times)
+    stop = count if settings.stop is None else settings.stop
+    chosen = np.arange(count)[settings.start : stop]
+    if stop > count or len(chosen) < FEWEST_FRAMES:
+        raise ValueError(
+            f"{name}: start is {settings.start} and stop {settings.stop}; expected a part of at "
+            f"least {FEWEST_FRAMES} of the {count} frames."
+        )
+    # Graphics are drawn in single precision: far from its zero, a map's grid would have no digits.
+    poses = drive.poses[chosen]
+    origin = np.round(poses[0, 0, :3, 3])
+    poses[..., :3, 3] -= origin
+    dataset = poses_dataset(
+        poses,
+        drive.intrinsics,
+        drive.distortion,
+        (drive.width, drive.height),
+        instant=chosen,
+        origin=origin,
+    )
+    notes = [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
+    shown = {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
+    return dataset, {**shown, NOTES: notes}
+
+
+def _planned(settings: PoseSettings) -> Result:
+    """The way through the city, and the exposures of its photographs."""
+    from pipelines.virtual.city.drive import plan_drive
+
+    size = settings.width, settings.width * 5 // 8
+    drive = plan_drive(
+        settings.frames,
+        settings.spacing,
+        *size,
+        view_angle=settings.view_angle,
+        baseline=settings.baseline,
+        seed=settings.seed,
+        exposure_spread=settings.exposure_spread,
+    )
+    distortion = np.zeros((drive.poses.shape[1], 5))
+    dataset = poses_dataset(drive.poses, drive.intrinsics, distortion, size)
+    metres = settings.frames * settings.spacing
+    exposed = dataset.assign(exposure=(("frame", "camera"), drive.gains))
+    return exposed.assign_attrs(metres=metres, seed=settings.seed), {"metres": metres}
