@@ -115,8 +115,10 @@ def _precompute_figures(made: dict[int, dict[str, Any]]) -> dict[str, Any]:
         "peak_rss_mb_all": {str(factor): one["peak_rss_mb"] for factor, one in made.items()},
     }
     if len(made) > 1:
-        logs = np.log([(one["vertices"], one["total_seconds"]) for one in made.values()])
-        found["growth_exponent"] = float(np.polyfit(*logs.T, 1)[0])
+        vertices, seconds = (
+            np.log([one[name] for one in made.values()]) for name in ("vertices", "total_seconds")
+        )
+        found["growth_exponent"] = float(np.polyfit(vertices, seconds, 1)[0])
     return found
 
 
