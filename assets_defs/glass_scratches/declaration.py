@@ -86,7 +86,7 @@ SCRATCHES = System(
         Dimension(
             "setting",
             builtin=SETTINGS,
-            examples=("setting-2", "worn"),
+            examples=("worn",),
             default="setting-2",
             suffixes=(
                 *(".csv", ".txt", ".tsv", ".dat", ".asc", ".prf", ".smd", ".sdf"),

@@ -49,7 +49,7 @@ BTF = System(
         Dimension(
             "material",
             builtin=tuple(MATERIALS),
-            examples=("knit", "silk"),
+            examples=("knit",),
             default="knit",
             suffixes=(".zip", ".btf"),
             folders=True,

@@ -43,7 +43,7 @@ FUR = System(
         Dimension(
             "photo",
             builtin=(*BUILTIN_PHOTOGRAPHS, PELT),
-            examples=("grass", PELT),
+            examples=("grass",),
             default=PELT,
             suffixes=SUFFIXES,
             check=_check_photograph,

@@ -66,7 +66,7 @@ SSDF = System(
         Dimension(
             "environment",
             builtin=(*ENVIRONMENTS, "uniform"),
-            examples=("sky", "lamps"),
+            examples=("sky",),
             default="sky",
             suffixes=(".hdr", ".exr"),
             check=_check_environment,
