@@ -49,15 +49,12 @@ def as_pinhole(
     *,
     nearest: bool = False,
 ) -> NDArray[Any]:
-    """A photograph (h, w, channels), uint8 or uint16, as a pinhole of K ``intrinsics`` takes it, (height, width,
-    channels): looked up between pixels, or at the ``nearest`` one; black outside of what was
-    photographed. What has that K, that size and no distortion comes back as it is.
+    """A photograph (h, w, channels), uint8 or uint16, as a pinhole of K ``intrinsics`` takes it:
+    (height, width, channels), looked up between pixels or at the ``nearest`` one, black outside of
+    what was photographed. What has that K, that size and no distortion comes back as it is.
     """
-    own, own_width, own_height = pinhole_of(lens)
-    same = np.array_equal(own, intrinsics, equal_nan=True) and (own_width, own_height) == (
-        width,
-        height,
-    )
+    own, *size = pinhole_of(lens)
+    same = size == [width, height] and np.array_equal(own, intrinsics, equal_nan=True)
     if lens.model == PINHOLE and same and not any(lens.coefficients):
         return codes
     import cv2

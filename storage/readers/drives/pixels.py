@@ -73,7 +73,7 @@ def read_masks(drive: Drive, frame: int) -> NDArray[np.bool_] | None:
             continue
         codes = decode_image(mask).colours
         check_size(mask, (codes.shape[1], codes.shape[0]), (lens.w, lens.h))
-        white = (255 * (codes > 0).any(axis=2, keepdims=True)).astype(np.uint8)
+        white = np.where((codes > 0).any(axis=2, keepdims=True), np.uint8(255), np.uint8(0))
         width, height = drive.sizes[camera]
         flat = as_pinhole(white, lens, drive.intrinsics[camera], width, height, nearest=True)
         used[camera, :height, :width] = flat[..., 0] > 0
