@@ -100,6 +100,10 @@ def set_at(path: tuple[Any, ...], value: Any) -> Callable[[Json], None]:
     return change
 
 
+def without_focal(transforms: Json) -> None:
+    del transforms["fl_x"], transforms["fl_y"]
+
+
 def without(*path: Any) -> Callable[[Json], None]:
     def change(transforms: Any) -> None:
         for key in path[:-1]:
@@ -332,7 +336,7 @@ def test_no_drive(tmp_path: Path) -> None:
     assert "a file" in refusal(lambda: read_drive(photograph), "left_0.png")
     (folder / "transforms.json").unlink()
     text = refusal(lambda: read_drive(folder), "street")
-    assert "without transforms.json" in text
+    assert "a folder without any of these; expected one of transforms.json (nerfstudio" in text
     (folder / "transforms.json").mkdir()
     assert "file is a directory" in refusal(lambda: read_drive(folder))
 
@@ -348,7 +352,7 @@ def test_no_drive(tmp_path: Path) -> None:
         (b"[1, 2]", "content is [1, 2]; expected a JSON object"),
         (b"{}", "frames is missing"),
         (b'{"frames": {}}', "frames is {}; expected a list"),
-        (b'{"frames": []}', "number of cameras is 0; expected at least 2"),
+        (b'{"frames": []}', "number of cameras is 0; expected at least 1"),
         (b'{"frames": [3]}', "frames[0] is 3; expected a JSON object"),
         (b'{"frames": [], "cameras": []}', "cameras is []; expected a JSON object"),
     ],
@@ -371,14 +375,9 @@ MATRIX = ("frames", 4, "transform_matrix")
 @pytest.mark.parametrize(
     ("change", "part"),
     [
-        *[
-            (without(key), f"{key} is missing for camera left; expected a number in the frame, in")
-            for key in LENS
-        ],
-        *[
-            (without("frames", 4, key), f"frames[4].{key} is missing")
-            for key in ("file_path", "transform_matrix", "camera", "time")
-        ],
+        (without_focal, "fl_x is missing for camera left; expected a number in the fra"),
+        (without("frames", 4, "file_path"), "frames[4].file_path is missing"),
+        (without("frames", 4, "transform_matrix"), "frames[4].transform_matrix is missing"),
         (set_at(("fl_x",), "30"), 'fl_x is "30"; expected a number'),
         (set_at(("fl_x",), math.nan), "fl_x is nan; expected a finite number"),
         (set_at(("fl_y",), 0), "fl_y is 0; expected more than 0 pixels"),
@@ -393,8 +392,8 @@ MATRIX = ("frames", 4, "transform_matrix")
         (set_at(("k2",), None), "k2 is null; expected a number"),
         (set_at(("cameras",), {"left": 3}), "cameras.left is 3; expected a JSON object"),
         (set_at(("cameras",), {"right": {"p2": "x"}}), 'cameras.right.p2 is "x"; expected a num'),
-        (set_at(("camera_model",), "OPENCV_FISHEYE"), 'camera_model is "OPENCV_FISHEYE"; expe'),
-        (set_at(("is_fisheye",), True), "is_fisheye is true; expected a pinhole"),
+        (set_at(("camera_model",), "FISHEYE624"), 'camera_model is "FISHEYE624"; expected a pin'),
+        (set_at(("ftheta_p0",), 0.1), "ftheta_p0 is 0.1; expected a pinhole"),
         (set_at(("cameras",), {"left": {"k4": 0.1}}), "cameras.left.k4 is 0.1; expected a pinhole"),
         (set_at(("frames", 4, "camera"), None), "frames[4].camera is null; expected a name"),
         (set_at(("frames", 4, "camera"), " "), 'frames[4].camera is " "; expected a name'),
@@ -417,30 +416,20 @@ MATRIX = ("frames", 4, "transform_matrix")
         (set_at((*MATRIX, 0, 0), "a"), 'transform_matrix[0][0] is "a"; expected a number'),
         (set_at((*MATRIX, 0, 0), 1e200), "frames[4].transform_matrix is no rotation"),
         (set_at((*MATRIX, 0, 3), 1e200), "frames[4].transform_matrix is a place 1e+200 m away"),
-        (set_at(MATRIX, (np.eye(4) * 1.001).tolist()), "frames[4].transform_matrix is no rotation"),
-        (set_at(MATRIX, np.diag([1, 1, -1, 1]).tolist()), "transform_matrix is no rotation"),
+        (set_at(MATRIX, (np.eye(4) * 1.001).tolist()), "frames[4].transform_matrix[3] is [0.0, 0."),
+        (set_at(MATRIX, np.diag([1, 1, -1, 1]).tolist()), "matrix is no rotation (mirrored); ex"),
+        (set_at(MATRIX, np.diag([1, 1, 1.02, 1]).tolist()), "matrix is no rotation (sheared, or"),
+        (set_at((*MATRIX, 0), [1, 0.02, 0, 0]), "frames[4].transform_matrix is no rotation"),
+        (set_at(MATRIX, np.zeros((4, 4)).tolist()), "is no rotation (its axes lie in a plane)"),
         (set_at((*MATRIX, 3), [1, 2, 3, 1]), "transform_matrix[3] is [1, 2, 3, 1]; expected [0"),
         (
-            set_at(("frames", 4, "fl_x"), 29.0),
-            "fl_x of camera middle is 29 at time 1; expected 30 as at time 0",
-        ),
-        (
-            set_at(("cameras",), {"right": {"w": 40, "h": 30}}),
-            "picture size of camera right is 40 x 30 pixels; expected 32 x 24 pixels as of "
-            "camera left",
-        ),
-        (
             set_at(("frames", 4, "time"), 0),
-            "frames[4] is a second photograph of camera middle at time 0",
+            "picture middle_1.png is a second photograph of camera middle at time 0",
         ),
-        (
-            without("frames", 4),
-            "set of cameras at time 1 is left, right; expected left, middle, right",
-        ),
-        (
-            set_at(("frames", 4, "time"), 3.2),
-            "set of cameras at time 1 is left, right; expected left, middle, right",
-        ),
+        (set_at(("applied_transform",), np.diag([1, -1, 1]).tolist()), "applied_transform is not"),
+        (set_at(("applied_transform",), np.diag([1, -1, 1, 1]).tolist()), "no rotation (mirrored"),
+        (set_at(("applied_scale",), 0), "applied_scale is 0; expected a scale above 0"),
+        (set_at(("frames", 4, "mask_path"), "../mask.png"), "mask_path is"),
     ],
 )
 def test_planted_errors(tmp_path: Path, change: Callable[[Json], None], part: str) -> None:
@@ -466,23 +455,19 @@ def moved(transforms: Json, metres: Callable[[str, int], float]) -> None:
 @pytest.mark.parametrize(
     ("options", "part"),
     [
-        ({"rig": {"left": 0.0}}, "number of cameras is 1; expected at least 2"),
         ({"ways": (0.0, 1.0)}, "number of instants is 2; expected at least 3"),
         (
             {"rig": {"left": 0.0, "right": 0.0009}},
-            "distance of cameras left and right is 0.0009 m at time",
+            "distance of cameras left and right is 0.0009 at time",
         ),
-        ({"ways": (0.0, 0.0, 0.0)}, "way of the car is 0.00 m; expected at least 0.50 m"),
-        ({"ways": (0.0, 0.2, 0.49)}, "way of the car is 0.49 m; expected at least 0.50 m"),
+        ({"ways": (0.0, 0.0, 0.0)}, "way of the car is 0; expected at least 0.5"),
+        ({"ways": (0.0, 0.2, 0.49)}, "way of the car is 0.49; expected at least 0.5"),
         # A parked car, whose path grows with the noise of its places.
-        ({"ways": (0.0, 0.2) * 20}, "way of the car is 0.20 m; expected at least 0.50 m"),
-        (
-            {"rig": {"left": 0.0, "right": 0.01}, "ways": (0.0, 0.05, 0.09)},
-            "way of the car is 0.09 m; expected at least 0.10 m",
-        ),
+        ({"ways": (0.0, 0.2) * 20}, "way of the car is 0.2; expected at least 0.5"),
+        ({"rig": {"only": 0.0}, "ways": (2.0, 2.0, 2.0)}, "way of the car is 0; expected at leas"),
         (
             {"ways": (0.0, 1.0, 2.0, 3.0, 63.0, 64.0)},
-            "way of the car between time 3 and 4 is 60.0 m, 60 times the median; expected no gap",
+            "way of the car between time 3 and 4 is 60.0, 60 times the median; expected no gap",
         ),
         (
             {"change": lambda t: moved(t, lambda name, time: 0.1 * time * (name == "right"))},
@@ -491,14 +476,12 @@ def moved(transforms: Json, metres: Callable[[str, int], float]) -> None:
         (
             {"change": lambda t: moved(t, lambda name, time: 0.06 * (time == 2 and name == "left")),
              "heading": 0},
-            "distance of cameras left and middle is 0.4400 m at time 2 and 0.5000 m at time",
+            "distance of cameras left and middle is 0.4400 at time 2 and 0.5000 at time",
         ),
     ],
 )  # fmt: skip
 def test_no_rig_and_no_way(tmp_path: Path, options: Json, part: str) -> None:
     folder = write_drive(tmp_path / "street", **options)
-    for photograph in folder.glob("*.png"):
-        photograph.unlink()
     text = refusal(lambda: read_drive(folder))
     assert part in text, text
 
@@ -520,7 +503,6 @@ def test_missing_and_wrong_photographs(tmp_path: Path) -> None:
         return read_drive(folder)
 
     file.unlink()
-    assert "photograph is missing" in refusal(read, file.name)
     file.mkdir()
     assert "photograph is a directory" in refusal(read, file.name)
     file.rmdir()

@@ -1,0 +1,237 @@
+"""What every format's module makes of its files: a `Recording`, before anything is judged of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from storage.readers.bad_input import BadInput, shortened
+
+MOST_FRAMES = 40_000
+"""Read and checked in some seconds."""
+LARGEST_SIDE = 32_766
+"""Pixels; OpenCV counts them in 16 bits."""
+FARTHEST = 1e8
+"""Metres: more than any coordinate on earth, in whatever grid."""
+
+PINHOLE = "pinhole"
+FISHEYE = "fisheye"
+PANORAMA = "panorama"
+
+_FOCAL_RANGE = 1e4  # of the width: from beyond any pinhole to beyond any telescope
+_LARGEST_COEFFICIENT = 1e9  # of the distortion; a long lens has large ones of high powers
+_ROTATION_TOLERANCE = 5e-3  # of matrices written with three decimals
+
+
+class Lens(NamedTuple):
+    """How a camera's photograph came about.
+
+    model: "pinhole"; "fisheye", an equidistant projection as OpenCV's; or "panorama", an
+        equirectangular picture of everything around: its middle is straight ahead.
+    w, h: the photograph's width and height, pixels.
+    fl_x, fl_y, cx, cy: focal lengths and principal point, pixels, the middle of the first pixel at
+        (0, 0); a panorama has none (0).
+    coefficients: distortion: OpenCV's k1, k2, p1, p2, k3 of a pinhole, k1 to k4 of a fisheye.
+    azimuth: of a view into a panorama, degrees to the right of its middle.
+    """
+
+    model: str
+    w: int
+    h: int
+    fl_x: float = 0.0
+    fl_y: float = 0.0
+    cx: float = 0.0
+    cy: float = 0.0
+    coefficients: tuple[float, ...] = ()
+    azimuth: float = 0.0
+
+
+class Frame(NamedTuple):
+    """One photograph.
+
+    time: in the recording's unit.
+    pose: (4, 4) float64, camera to world in OpenCV's axes (x right, y down, z forward), in the
+        recording's unit of length; None where it is not known.
+    lens: None where nothing is known of it.
+    mask: a picture that is black where the photograph is not to be used, or None.
+    """
+
+    camera: str
+    time: float
+    photograph: Path
+    pose: NDArray[np.float64] | None
+    lens: Lens | None
+    mask: Path | None = None
+
+
+class Recording(NamedTuple):
+    """What a format's files hold.
+
+    file: the one that is named where something is wrong with the whole.
+    frames: in no order; photographs that are listed and not there among them.
+    metric: the unit of length is known to be the metre.
+    up_known: the world's z is known to point up.
+    notes: sentences about how it was read.
+    spread: photographs of one instant are as far apart in time at most, in steps of one camera.
+    points: (n, 3) float64, points that the poses were found with, in the same world.
+    """
+
+    file: Path
+    frames: Sequence[Frame]
+    metric: bool = False
+    up_known: bool = False
+    notes: tuple[str, ...] = ()
+    spread: float = 0.25
+    points: NDArray[np.float64] = np.empty((0, 3))
+
+
+def shown_number(value: float) -> str:
+    """A number as short as it can be told from all others: 3, 3.2."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def check_count(file: Path, count: int) -> None:
+    """Raise BadInput for more photographs than can be read and checked in some seconds."""
+    if count > MOST_FRAMES:
+        raise BadInput(file, "number of frames", f"{count}", f"at most {MOST_FRAMES}")
+
+
+def file_inside(file: Path, folder: Path, name: str, field: str) -> Path:
+    """Where a name in a file leads from a folder: upwards never; what is written with backslashes
+    is found, too. Raises BadInput for a name that leaves the folder or is none."""
+    expected = "the path of a picture, from the folder"
+    if not name or "\0" in name:
+        raise BadInput(file, field, f'"{name}"', expected)
+    root = Path(os.path.abspath(folder))
+    found = Path(os.path.abspath(root / name))
+    if "\\" in name and not os.path.exists(found):
+        found = Path(os.path.abspath(root / name.replace("\\", "/")))
+    if root not in found.parents:
+        raise BadInput(file, field, f'"{name}"', "a path inside the folder")
+    return found
+
+
+def rotation(
+    file: Path, field: str, matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """The nearest rotation (3, 3) of a matrix that is one, but for decimals and a scale; the scale.
+
+    Raises BadInput for a matrix that is mirrored, sheared or scaled differently along its axes.
+    """
+    expected = "orthonormal, right-handed axes in columns 1 to 3"
+    largest = np.abs(matrix).max()
+    # Divided first: squares of large entries overflow, those of small ones vanish.
+    scaled = matrix / largest if 1e-150 < largest < np.inf else np.zeros((3, 3))
+    determinant = np.linalg.det(scaled)
+    if abs(determinant) < 1e-9:
+        raise BadInput(file, field, "no rotation (its axes lie in a plane)", expected)
+    scale = np.cbrt(abs(determinant))
+    off = np.abs(scaled.T @ scaled / scale**2 - np.eye(3)).max()
+    if off > _ROTATION_TOLERANCE:
+        found = "no rotation (sheared, or scaled differently along its axes)"
+        raise BadInput(file, field, found, expected)
+    if determinant < 0:
+        raise BadInput(file, field, "no rotation (mirrored)", expected)
+    # Whoever uses a pose takes the transpose for the inverse; a few decimals are not enough.
+    left, _, right = np.linalg.svd(scaled)
+    return left @ right, float(scale * largest)
+
+
+def place(file: Path, field: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A camera's place as it is; raises BadInput where it cannot be one on earth."""
+    if not np.isfinite(values).all():
+        raise BadInput(file, field, "not finite", "a place in finite numbers")
+    if np.abs(values).max() > FARTHEST:
+        raise BadInput(
+            file, field, f"a place {np.abs(values).max():.3g} m away", "a place on earth"
+        )
+    return values
+
+
+def quaternion_rotation(
+    file: Path, field: str, quaternion: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(3, 3) of a quaternion w, x, y, z, made a unit one; raises BadInput where it is none."""
+    length = float(np.linalg.norm(quaternion)) if np.isfinite(quaternion).all() else 0.0
+    if not 0.5 < length < 2:
+        found = f"a quaternion of length {length:.3g}"
+        raise BadInput(file, field, found, "a unit quaternion w, x, y, z")
+    w, x, y, z = quaternion / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def rigid(turn: NDArray[np.float64], where: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4, 4) of a rotation (3, 3) and a place (3,)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, where
+    return pose
+
+
+def inverse(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4, 4) of a rigid motion, the other way."""
+    return rigid(pose[:3, :3].T, -pose[:3, :3].T @ pose[:3, 3])
+
+
+def check_lens(file: Path, lens: Lens, field: Callable[[str], str], corner: float = 0.0) -> Lens:
+    """The lens, if it can be one.
+
+    ``field`` says what a value ("fl_x", "k1" …) is called in the file; ``corner`` is 0.5 where the
+    file counts pixels from the first one's outer corner. Raises BadInput for a picture without a
+    size, focal lengths of no camera, a principal point outside of the picture, coefficients out of
+    any range; and for any that is not finite.
+    """
+    for key in ("w", "h"):
+        side = getattr(lens, key)
+        if not 1 <= side <= LARGEST_SIDE:
+            expected = f"a whole number of pixels from 1 to {LARGEST_SIDE}"
+            raise BadInput(file, field(key), shown_number(side), expected)
+    if lens.model == PANORAMA:
+        return lens
+    for key in ("fl_x", "fl_y"):
+        focal = getattr(lens, key)
+        least, most = lens.w / _FOCAL_RANGE, lens.w * _FOCAL_RANGE
+        if not focal > 0:
+            raise BadInput(file, field(key), shown_number(focal), "more than 0 pixels")
+        if not least <= focal <= most:
+            expected = f"{least:g} to {most:g} pixels, for a picture {lens.w} wide"
+            raise BadInput(file, field(key), shown_number(focal), expected)
+    for key, side in (("cx", lens.w), ("cy", lens.h)):
+        value = getattr(lens, key) + corner
+        first = corner - 0.5
+        if not first < value < side + first:
+            expected = f"a place inside the picture, between {first:g} and {side + first:g} pixels"
+            raise BadInput(file, field(key), shown_number(value), expected)
+    keys = ("k1", "k2", "p1", "p2", "k3") if lens.model == PINHOLE else ("k1", "k2", "k3", "k4")
+    for key, value in zip(keys, lens.coefficients, strict=False):
+        if not abs(value) <= _LARGEST_COEFFICIENT:
+            expected = f"a coefficient of at most {_LARGEST_COEFFICIENT:g}"
+            raise BadInput(file, field(key), shown_number(value), expected)
+    return lens
+
+
+def pinhole_lens(k: NDArray[np.float64], width: int, height: int) -> Lens:
+    """The lens of K (3, 3), the middle of the first pixel at (0, 0), without distortion."""
+    focal, centre = (float(k[0, 0]), float(k[1, 1])), (float(k[0, 2]), float(k[1, 2]))
+    return Lens(PINHOLE, width, height, *focal, *centre)
+
+
+def counted(count: int, noun: str) -> str:
+    """ "1 photograph", "2 photographs"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Some names in a sentence, sorted."""
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return shortened(", ".join(sorted(names)[:8])) + more
