@@ -36,8 +36,17 @@ class PosePoints(NamedTuple):
     """(p, 3), metres."""
     colours: NDArray[np.uint8]
     """(p, 3), sRGB."""
+    distortion: NDArray[np.float64]
+    """(c, 5), OpenCV's; 0 where the reader has taken out what is known."""
     focal_deviation: NDArray[np.float64]
     """(c,), pixels; 0 where the focal length was given."""
+
+
+def _nothing_found(cameras: int) -> PosePoints:
+    """Of a drive whose poses are given."""
+    return PosePoints(
+        np.empty((0, 3)), np.empty((0, 3), np.uint8), np.zeros((cameras, 5)), np.zeros(cameras)
+    )
 
 
 def stacked_by_frame(
@@ -68,7 +77,6 @@ def stacked_by_frame(
 def poses_dataset(
     poses: NDArray[np.float64],
     intrinsics: NDArray[np.float64],
-    distortion: NDArray[np.float64],
     size: tuple[int, int],
     *,
     instant: NDArray[np.integer] | None = None,
@@ -82,12 +90,12 @@ def poses_dataset(
     import xarray as xr
 
     frames, cameras = poses.shape[:2]
-    found = found or PosePoints(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.zeros(cameras))
+    found = found or _nothing_found(cameras)
     return xr.Dataset(
         {
             "poses": (("frame", "camera", "row_4", "column_4"), poses),
             "intrinsics": (("camera", "row", "column"), intrinsics),
-            "distortion": (("camera", "coefficient"), distortion),
+            "distortion": (("camera", "coefficient"), found.distortion),
             "size": (("side",), np.array(size, np.int64)),
             "instant": (("frame",), np.arange(frames) if instant is None else instant),
             "origin": (("axis",), np.zeros(3) if origin is None else origin),

@@ -107,10 +107,10 @@ def _taken_in(drive: Drive, poses: xr.Dataset) -> Result:
     from pipelines.street_billboards.capture.held_out import held_out
 
     lenses, size = poses["intrinsics"].values, (drive.width, drive.height)
-    seen = drive._replace(intrinsics=lenses, distortion=poses["distortion"].values)
+    distortion = poses["distortion"].values
 
     def taken(frame: int) -> NDArray[np.uint8]:
-        return centre_photographs(read_frame(seen, frame), lenses)
+        return centre_photographs(read_frame(drive, frame), lenses, distortion)
 
     shape = (len(drive.cameras), drive.height, drive.width, 3)
     photographs = stacked_by_frame(taken, poses["instant"].values, (shape, np.uint8))

@@ -105,15 +105,10 @@ def _given(drive: Drive, settings: PoseSettings, name: str) -> Result:
     poses = drive.poses[chosen]
     origin = np.round(poses[0, 0, :3, 3])
     poses[..., :3, 3] -= origin
-    dataset = poses_dataset(
-        poses,
-        drive.intrinsics,
-        drive.distortion,
-        (drive.width, drive.height),
-        instant=chosen,
-        origin=origin,
-    )
-    notes = [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
+    size = drive.width, drive.height
+    dataset = poses_dataset(poses, drive.intrinsics, size, instant=chosen, origin=origin)
+    notes = [*drive.notes]
+    notes += [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
     shown = {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
     return dataset, {**shown, NOTES: notes}
 
@@ -132,8 +127,7 @@ def _planned(settings: PoseSettings) -> Result:
         seed=settings.seed,
         exposure_spread=settings.exposure_spread,
     )
-    distortion = np.zeros((drive.poses.shape[1], 5))
-    dataset = poses_dataset(drive.poses, drive.intrinsics, distortion, size)
+    dataset = poses_dataset(drive.poses, drive.intrinsics, size)
     metres = settings.frames * settings.spacing
     exposed = dataset.assign(exposure=(("frame", "camera"), drive.gains))
     return exposed.assign_attrs(metres=metres, seed=settings.seed), {"metres": metres}
