@@ -34,6 +34,12 @@ class Sightings(NamedTuple):
     places: FloatArray
     """(m, 2), pixels; the middle of the first pixel is at (0, 0)."""
 
+    def some(self, chosen: NDArray[Any]) -> Sightings:
+        """Those at ``chosen``: rows, or a bool for each."""
+        return Sightings(
+            self.frame[chosen], self.camera[chosen], self.point[chosen], self.places[chosen]
+        )
+
 
 class Bundle(NamedTuple):
     """f instants of a rig of c cameras, n points."""
@@ -238,7 +244,7 @@ def sum_by(number: IntArray, values: FloatArray, count: int) -> FloatArray:
     """Sums (count, …) of values (m, …) of each number (m,)."""
     flat = values.reshape(len(values), -1)
     sums = [np.bincount(number, column, count) for column in flat.T]
-    return np.stack(sums, axis=1).reshape(count, *values.shape[1:])
+    return np.stack(sums, axis=1).astype(np.float64).reshape(count, *values.shape[1:])
 
 
 # ---- geometry and priors -----------------------------------------------------------------------

@@ -129,4 +129,4 @@ def _last_column_of_inverse(matrix: FloatArray) -> FloatArray | None:
 def _by_cell(moved: FloatArray, seen: Sightings) -> FloatArray:
     low, high = seen.places.min(axis=0), seen.places.max(axis=0)
     cell: NDArray[Any] = ((seen.places - low) / (high - low + 1e-9) * _CELLS).astype(np.int64)
-    return np.bincount(cell[:, 0] * _CELLS + cell[:, 1], moved)
+    return np.asarray(np.bincount(cell[:, 0] * _CELLS + cell[:, 1], moved), np.float64)

@@ -117,7 +117,9 @@ class _Shot:
 
         self._last = frame
         found = cv2.goodFeaturesToTrack(frame.grey, _CORNERS, 0.003, 7)
-        self._from = np.zeros((0, 2), np.float32) if found is None else found.reshape(-1, 2)
+        self._from: NDArray[np.float32] = (
+            np.zeros((0, 2), np.float32) if found is None else np.float32(found).reshape(-1, 2)
+        )
         self._to = self._from
         self._waiting = []
 

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from pipelines.street_billboards.poses.bundle import Bundle, Sightings
 from pipelines.street_billboards.poses.features import Features, match_features
 
+FloatArray = NDArray[np.float64]
+
 NEIGHBOURS = 8
 """Frames ahead that each is matched with."""
 FEWEST_MATCHES = 15
@@ -162,8 +164,11 @@ def _mapped(model: Any) -> Mapped:
     focal, *middle = model.camera(1).params
     lens = [[focal, 0, middle[0] - 0.5], [0, focal, middle[1] - 0.5], [0, 0, 1]]
     row_of = {number: row for row, number in enumerate(images)}
-    points, frame, point, feature = [], [], [], []
-    places = []
+    frame: list[int] = []
+    point: list[int] = []
+    feature: list[int] = []
+    points: list[FloatArray] = []
+    places: list[FloatArray] = []
     pictures = {number: model.image(number).points2D for number in images}
     for known in model.points3D.values():
         for element in known.track.elements:
