@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.virtual.city.bend import STRAIGHT, Bend, bent_points, turned_vectors
 from pipelines.virtual.city.cars import car
 from pipelines.virtual.city.facades import gap_wall, house
 from pipelines.virtual.city.furniture import cover, pole, tree
@@ -58,13 +59,15 @@ class City(NamedTuple):
     """(t,), places in MATERIALS."""
     pole: NDArray[np.bool_]
     """(t,), thin poles."""
+    bend: Bend = STRAIGHT
+    """Of the road: x and y are along and beside it only where it is straight."""
 
 
-def make_city(length: float, seed: int = 0) -> City:
+def make_city(length: float, seed: int = 0, bend: Bend = STRAIGHT) -> City:
     """A street for a drive from x = 0 to ``length`` metres.
 
-    It reaches from x = -10 to length + 40 and is closed there. The same seed gives the same city.
-    Raises ValueError for a length that is not positive.
+    It reaches from x = -10 to length + 40 and is closed there. The same seed gives the same city;
+    a bend (`bend.road_bend`) bends all of it. Raises ValueError for a length that is not positive.
     """
     if not 0.0 < length < np.inf:
         raise ValueError(f"length is {length}; expected metres, more than 0.")
@@ -75,8 +78,14 @@ def make_city(length: float, seed: int = 0) -> City:
         parts += _furniture(side, start, end, seed)
     parts += _closed(start, end, seed)
     whole = join_parts(parts)
+    if bend.angle:
+        along = whole.vertices[:, 0]
+        whole = whole._replace(
+            vertices=bent_points(whole.vertices, bend).astype(np.float32),
+            normals=turned_vectors(whole.normals, along, bend).astype(np.float32),
+        )
     visibility = sky_visibility(whole.vertices, whole.normals, whole.triangles)
-    return City(**whole._asdict(), sky_visibility=visibility)
+    return City(**whole._asdict(), sky_visibility=visibility, bend=bend)
 
 
 def _ground(start: float, end: float, seed: int) -> Part:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.colour import to_8bit
 from pipelines.geometry.cameras import moved_left
+from pipelines.virtual.city.bend import STRAIGHT, Bend, bent_poses
 
 FloatArray = NDArray[np.float64]
 
@@ -47,9 +48,11 @@ def plan_drive(
     camera_height: float = 1.9,
     seed: int = 0,
     exposure_spread: float = 0.12,
+    bend: Bend = STRAIGHT,
 ) -> SimulatedDrive:
-    """A drive from x = 0 towards +x: a frame every ``spacing`` metres of x.
+    """A drive from x = 0 towards +x: a frame every ``spacing`` metres of the road.
 
+    bend: of the road, as of the city that is driven through.
     view_angle: horizontal, degrees. Cameras are, from 0 to 2, ``baseline`` metres to the left of
     the car's middle, in it, and to its right, at ``camera_height`` metres. A camera's gain is a
     constant of a few percent times a slow drift, whose standard deviation over a long drive is
@@ -71,6 +74,8 @@ def plan_drive(
     y = _LANE + _SWAY * np.sin(turn * x + phase)
     heading = np.arctan(_SWAY * turn * np.cos(turn * x + phase))
     car = np.stack([_pose(*row, camera_height) for row in zip(x, y, heading, strict=True)])
+    if bend.angle:
+        car = bent_poses(car, bend)
     offsets = (baseline, 0.0, -baseline)
     poses = np.stack([[moved_left(pose, offset) for offset in offsets] for pose in car])
     focal = width / (2.0 * np.tan(np.radians(view_angle) / 2.0))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipelines.drawing.glsl import surface_shader
 from pipelines.drawing.stage import Camera, Stage, surface, texture
+from pipelines.virtual.city.bend import headings, straightened_points, turned_vectors
 from pipelines.virtual.city.city import City
 from pipelines.virtual.city.materials import city_textures
 from pipelines.virtual.city.parts import MATERIALS, POSTERS
@@ -70,7 +71,8 @@ class CityStage:
         self._drawn = _Chunks(city, city.material * 2 + _glossy(city))
         textures = {name: _repeated(image) for name, image in images.items()}
         light = city.sky_visibility[:, None] * (_SKY - _BOUNCE) + _BOUNCE
-        elevations = street_elevations(city, light)
+        straight, turns = _straightened(city)
+        elevations = street_elevations(straight, light)
         mirrored = {"elevations": texture(elevations.picture), "sky": texture(sky)}
         self._eyes: list[Any] = []
         for part in self._drawn.parts:
@@ -79,6 +81,8 @@ class CityStage:
             samplers = {"picture": textures[MATERIALS[material]], "stains": textures["stains"]}
             if has_gloss:
                 attributes |= {"shading": city.normals, "gloss": city.gloss}
+                if city.bend.angle:
+                    attributes |= {"straight": straight.vertices, "turn": turns}
                 samplers |= mirrored
             actor = surface(
                 city.vertices[part.vertices],
@@ -89,6 +93,7 @@ class CityStage:
                     "city_vertex.glsl",
                     "city_fragment.glsl",
                     GLOSS=bool(has_gloss),
+                    BENT=bool(city.bend.angle),
                     STAINED=material not in _UNSTAINED,
                     LEVEL_BIAS=_SHARPER,
                     **shader_values(elevations),
@@ -212,6 +217,19 @@ class _Chunks:
         ahead = 3.0 if forward < -0.5 else _FARTHEST
         for part in self.parts:
             part.actor.SetVisibility(bool(x - back < part.high and part.low < x + ahead))
+
+
+def _straightened(city: City) -> tuple[City, NDArray[np.float32]]:
+    """The city before its road was bent, and the bend's turn at each vertex (v, 2), cosine and
+    sine: what panes mirror is looked up in the straight street."""
+    places = straightened_points(city.vertices, city.bend)
+    turn = headings(places[:, 0], city.bend)
+    turns = np.stack([np.cos(turn), np.sin(turn)], axis=1).astype(np.float32)
+    if not city.bend.angle:
+        return city, turns
+    back = city.bend._replace(angle=-city.bend.angle)
+    normals = turned_vectors(city.normals, places[:, 0], back).astype(np.float32)
+    return city._replace(vertices=places.astype(np.float32), normals=normals), turns
 
 
 def _glossy(city: City) -> NDArray[np.int32]:
