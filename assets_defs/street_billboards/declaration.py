@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from assets_defs.sources import Source
 from assets_defs.system import Dimension, System
 from storage.readers.drives import Drive, read_drive, read_frame
+from storage.readers.films import SUFFIXES as FILM_SUFFIXES
 from storage.versions import Slot, VersionedStore
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 CITY = "city"
@@ -21,7 +23,8 @@ def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
     """Everything but the pixels; then a few frames, whether they show one world: once."""
     if source.path is not None:
         drive = read_drive(source.path)
-        if "start" in settings:  # those of `drive_poses`, which comes first
+        is_first = "start" in settings  # those of `drive_poses`
+        if is_first and not np.isnan(drive.poses).any():
             _check_agreement(drive, source.name)
 
 
@@ -65,7 +68,7 @@ STREET = System(
             builtin=(CITY,),
             examples=(CITY,),
             default=CITY,
-            suffixes=(),
+            suffixes=FILM_SUFFIXES,
             check=_check_drive,
             folders=True,
         ),

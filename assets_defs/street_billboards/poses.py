@@ -11,16 +11,17 @@ from pydantic import Field
 from assets_defs.checks import Check
 from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
-from assets_defs.street_billboards.capture_datasets import poses_dataset
+from assets_defs.street_billboards.capture_datasets import PosePoints, poses_dataset
 from assets_defs.street_billboards.declaration import STREET
-from assets_defs.system import NOTES, Pictures, Result
+from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.street_billboards import figures
-from storage.readers.drives import Drive, frame_notes, read_drive
+from storage.readers.drives import Drive, frame_notes, read_drive, read_frame
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 
 class PoseSettings(Settings):
@@ -37,6 +38,15 @@ class PoseSettings(Settings):
     seed: int = Field(0, ge=0, description="Built-in drive: seed")
     start: int = Field(0, ge=0, description="Your drive: first frame of this tile of it")
     stop: int | None = Field(None, ge=8, description="Your drive: frame after the last")
+    adjust: bool = Field(
+        False, description="Your drive: improve its poses, where they are some centimetres off"
+    )
+    focal: float | None = Field(
+        None, gt=0, description="Your film: focal length, pixels; what it says or shows if not set"
+    )
+    camera_height: float = Field(
+        1.5, gt=0, le=20, description="Your film: metres of the camera above the road; tells scale"
+    )
 
     sizes: ClassVar[Mapping[Preset, Mapping[str, object]]] = {
         "test": {"frames": 9, "width": 256},
@@ -45,13 +55,12 @@ class PoseSettings(Settings):
 
 
 def metres_of(source: Source, settings: Settings) -> float:
-    """Length of a drive."""
+    """Length of a drive; 0 where it is not known before its poses are found."""
     given = settings.model_dump()
     if source.path is None:
         return float(given["frames"] * given["spacing"])
-    return figures.path_length(
-        read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
-    )
+    places = read_drive(source.path).poses[given["start"] : given["stop"], 0, :3, 3]
+    return 0.0 if np.isnan(places).any() else figures.path_length(places)
 
 
 def _pictures(dataset: xr.Dataset) -> Pictures:
@@ -82,15 +91,19 @@ def _frame_spacing(version: StoredVersion) -> float:
         ),
     ),
 )
-def drive_poses(settings: PoseSettings, source: Source) -> Result:
-    """Take the drive's poses, or plan a drive through the simulated city."""
-    if source.path is not None:
-        return _given(read_drive(source.path), settings, source.name)
-    return _planned(settings)
+def drive_poses(settings: PoseSettings, source: Source, progress: Progress) -> Result:
+    """Take the drive's poses, adjust or find them, or plan a drive through the simulated city."""
+    if source.path is None:
+        return _planned(settings)
+    drive = read_drive(source.path)
+    chosen = _part_of(drive, settings, source.name)
+    if np.isnan(drive.poses).all():
+        return _found(drive, chosen, settings, progress)
+    return _given(drive, chosen, settings, progress)
 
 
-def _given(drive: Drive, settings: PoseSettings, name: str) -> Result:
-    """The poses of a part of a user's drive."""
+def _part_of(drive: Drive, settings: PoseSettings, name: str) -> NDArray[np.int64]:
+    """Numbers of the frames that are asked for."""
     from pipelines.street_billboards.capture.held_out import FEWEST_FRAMES
 
     count = len(drive.times)
@@ -101,14 +114,58 @@ def _given(drive: Drive, settings: PoseSettings, name: str) -> Result:
             f"{name}: start is {settings.start} and stop {settings.stop}; expected a part of at "
             f"least {FEWEST_FRAMES} of the {count} frames."
         )
+    return chosen
+
+
+def _found(
+    drive: Drive, chosen: NDArray[np.int64], settings: PoseSettings, progress: Progress
+) -> Result:
+    """Of a film or photographs of one camera."""
+    from assets_defs.street_billboards.unposed import camera_of, pictures_of
+    from pipelines.street_billboards.poses.film_poses import pose_film
+
+    film = pose_film(
+        pictures_of(drive, chosen),
+        camera_of(drive, settings.focal),
+        camera_height=settings.camera_height,
+        places=drive.places,
+        progress=progress,
+    )
+    size = drive.width, drive.height
+    found = PosePoints(
+        film.points, film.colours, np.zeros((1, 5)), np.array([film.focal_deviation])
+    )
+    dataset = poses_dataset(
+        film.poses[:, None], film.intrinsics[None], size, instant=film.frames, found=found
+    )
+    focal = float(film.intrinsics[0, 0])
+    shown = {"frames": len(film.frames), "points": len(film.points), "focal length": focal}
+    notes = [*drive.notes, *film.notes]
+    return dataset.assign(used=(("camera", "y", "x"), film.used[None])), {**shown, NOTES: notes}
+
+
+def _given(
+    drive: Drive, chosen: NDArray[np.int64], settings: PoseSettings, progress: Progress
+) -> Result:
+    """The poses that a drive's files have, adjusted if asked for."""
+    notes = [*drive.notes]
+    notes += [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
     # Graphics are drawn in single precision: far from its zero, a map's grid would have no digits.
     poses = drive.poses[chosen]
     origin = np.round(poses[0, 0, :3, 3])
     poses[..., :3, 3] -= origin
+    if settings.adjust:
+        from pipelines.street_billboards.poses.adjusted_poses import adjust_poses
+
+        frames = (list(read_frame(drive, int(frame))) for frame in chosen)
+
+        def told(done: float) -> None:
+            progress(done / len(chosen))
+
+        adjusted = adjust_poses(frames, poses, drive.intrinsics, progress=told)
+        poses, notes = adjusted.poses, [*notes, *adjusted.notes]
     size = drive.width, drive.height
     dataset = poses_dataset(poses, drive.intrinsics, size, instant=chosen, origin=origin)
-    notes = [*drive.notes]
-    notes += [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
     shown = {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
     return dataset, {**shown, NOTES: notes}
 

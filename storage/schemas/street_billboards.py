@@ -37,6 +37,13 @@ DRIVE_POSES = Schema(
         "focal_deviation": Variable(
             ("camera",), "float64", "pixel", "Standard deviation of a focal length; 0 where given"
         ),
+        "used": Variable(
+            ("camera", "y", "x"),
+            "bool",
+            "1",
+            "Where a picture shows the world: not the bonnet, a logo, a date",
+            optional=True,
+        ),
         "exposure": Variable(
             ("frame", "camera"),
             "float64",

@@ -70,7 +70,7 @@ def drive_of(recording: Recording) -> Drive:
         names = _left_to_right(names, poses[0])
         poses = _checked(recording, moments, names)
     photographs = [[moment.get(name) for name in names] for moment in moments]
-    lenses = _checked_lenses(photographs)
+    lenses = _checked_lenses(photographs, are_known=recording.checked)
     firsts = [next(lens for lens in column if lens) for column in zip(*lenses, strict=True)]
     pinholes = [pinhole_of(lens) for lens in firsts]
     sizes = np.array([(width, height) for _, width, height in pinholes])
@@ -90,6 +90,8 @@ def drive_of(recording: Recording) -> Drive:
         lenses=lenses,
         masks=tuple(tuple(frame and frame.mask for frame in row) for row in photographs),
         points=recording.points,
+        film=recording.film,
+        places=_places(recording, len(moments)),
         metric=recording.metric,
         up_known=recording.up_known,
         notes=(*recording.notes, *missing, *told),
@@ -164,16 +166,26 @@ def _checked(
     return poses
 
 
+def _places(recording: Recording, count: int) -> NDArray[np.float64]:
+    if recording.places is None or len(recording.places) != count:
+        return np.full((count, 3), np.nan)
+    return recording.places
+
+
 def _checked_lenses(
-    photographs: Sequence[Sequence[Frame | None]],
+    photographs: Sequence[Sequence[Frame | None]], *, are_known: bool
 ) -> tuple[tuple[Lens | None, ...], ...]:
-    """Each photograph's lens, its size compared with the header's; of an unknown one the size."""
+    """Each photograph's lens, its size compared with the header's unless they are known; of an
+    unknown one the size."""
     rows = []
     for row in photographs:
         lenses: list[Lens | None] = []
         for frame in row:
             if frame is None:
                 lenses.append(None)
+                continue
+            if are_known:
+                lenses.append(frame.lens)
                 continue
             size = photograph_size(frame.photograph)
             nothing = (np.nan,) * 4

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.drives.recordings import Lens
+from storage.readers.films import Film
 
 
 class Drive(NamedTuple):
@@ -30,6 +31,8 @@ class Drive(NamedTuple):
     lenses: f tuples of c, how each photograph came about, None where it is not there.
     masks: f tuples of c files, None where a photograph has none.
     points: (n, 3) float64, the points that the poses were found with, where the files have them.
+    film: what the photographs are frames of, None where they are files.
+    places: (f, 3) float64, degrees north and east and metres above the sea; NaN: not known.
     metric: the unit of length is known to be the metre.
     up_known: the world's z is known to point up.
     notes: sentences about how the files were read.
@@ -48,6 +51,8 @@ class Drive(NamedTuple):
     lenses: tuple[tuple[Lens | None, ...], ...]
     masks: tuple[tuple[Path | None, ...], ...]
     points: NDArray[np.float64]
+    film: Film | None
+    places: NDArray[np.float64]
     metric: bool = False
     up_known: bool = False
     notes: tuple[str, ...] = ()

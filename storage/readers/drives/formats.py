@@ -13,6 +13,13 @@ from storage.readers.drives.kitti_raw import find_kitti_raw, read_kitti_raw
 from storage.readers.drives.nuscenes import find_nuscenes, read_nuscenes
 from storage.readers.drives.recordings import Recording
 from storage.readers.drives.transforms import find_transforms, read_transforms
+from storage.readers.drives.unposed import (
+    find_film,
+    find_photographs,
+    read_film_recording,
+    read_photographs_recording,
+)
+from storage.readers.photograph_folders import FEWEST
 
 
 class Format(NamedTuple):
@@ -70,6 +77,22 @@ FORMATS = (
         "has; of several models the largest.",
         find_colmap,
         read_colmap,
+    ),
+    Format(
+        "a film",
+        "film.mp4, .mov, .mkv, .avi …",
+        "Of one camera, by FFmpeg; its poses are found. A .gpx of its name beside it tells scale "
+        "and north.",
+        find_film,
+        read_film_recording,
+    ),
+    Format(
+        "photographs without poses",
+        f"a folder of {FEWEST} photographs or more",
+        "Of one camera in the order of their names; their poses are found. EXIF's focal length "
+        "and GPS are used, or a .gpx in the folder.",
+        find_photographs,
+        read_photographs_recording,
     ),
 )
 """The most specific first: what a folder is in several of is read as the first of them."""

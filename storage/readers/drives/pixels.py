@@ -14,6 +14,7 @@ from storage.readers.drives.driven import Drive
 from storage.readers.drives.headers import PHOTOGRAPH, check_size
 from storage.readers.drives.lenses import as_pinhole
 from storage.readers.drives.recordings import Lens
+from storage.readers.films import read_film_frame
 from storage.readers.opening import check_file, check_memory
 from storage.readers.pictures.image_decoding import decode_image
 from storage.readers.pictures.picture_sizes import LARGEST_PICTURE, MEMORY_PER_BYTE
@@ -32,6 +33,8 @@ def read_frame(drive: Drive, frame: int) -> NDArray[np.uint8]:
     has another size than when the drive was read or is missing; for more photographs than their
     files' sizes stand for; IndexError for an instant that is not there.
     """
+    if drive.film is not None:
+        return read_film_frame(drive.film, frame)[None]
     shape = (len(drive.cameras), drive.height, drive.width, 3)
     there = {file for file in drive.files[frame] if file is not None}
     stored = sum(check_file(file, PHOTOGRAPH, LARGEST_PICTURE) for file in there)
@@ -85,6 +88,8 @@ def frame_notes(drive: Drive, frame: int) -> tuple[str, ...]:
 
     Raises BadInput as :func:`decode_image` does; IndexError for an instant that is not there.
     """
+    if drive.film is not None:
+        return ()
     files = dict.fromkeys(file for file in drive.files[frame] if file is not None)
     said = (note for file in files for note in decode_image(file).notes)
     return tuple(dict.fromkeys(said))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput, shortened
+from storage.readers.films import Film
 
 MOST_FRAMES = 40_000
 """Read and checked in some seconds."""
@@ -79,6 +80,10 @@ class Recording(NamedTuple):
     notes: sentences about how it was read.
     spread: photographs of one instant are as far apart in time at most, in steps of one camera.
     points: (n, 3) float64, points that the poses were found with, in the same world.
+    checked: the lenses' sizes are those that the photographs' own heads say.
+    film: what all photographs are frames of, in the order of their times.
+    places: (f, 3) float64, degrees north and east and metres above the sea of each frame, NaN where
+        it is not known; one camera's.
     """
 
     file: Path
@@ -88,6 +93,9 @@ class Recording(NamedTuple):
     notes: tuple[str, ...] = ()
     spread: float = 0.25
     points: NDArray[np.float64] = np.empty((0, 3))
+    checked: bool = False
+    film: Film | None = None
+    places: NDArray[np.float64] | None = None
 
 
 def shown_number(value: float) -> str:
