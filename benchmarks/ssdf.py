@@ -1,8 +1,9 @@
 """Figures of SSDF lighting: the paper's table, bytes at equal error, speed, and pictures.
 
 The default scale judges the default scene as it is stored and drawn. ``--scale paper`` adds the
-paper's table, what each idea of the compact form is worth and general codecs, and makes the scene
-four and sixteen times as fine, too. docs/ssdf.md says what each figure means.
+paper's table, what each idea of the compact form is worth, general codecs and edges against finer
+directions, and makes the scene four and sixteen times as fine, too. docs/ssdf.md says what each
+figure means.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ PAPER_ERRORS = {"error_48": 0.312758, "error_90": 1.4008}
 PAPER_MB = {"raw": 266.0, "48": 66.4, "90": 22.2}
 """The paper's table, MB of 2^20 bytes."""
 FACTORS = {"default": (1,), "paper": (1, 2, 4, 16)}
-SINGLE_FACTORS = {"default": (1,), "paper": (1, 4, 16)}
+SINGLE_FACTORS = (1, 4, 16)
 CURVE_VALUES = (4, 8, 16, 32, 48, 64, 96)
 CURVE_CLUSTERS = (1, 4, 16, 64, 256)
 CURVE_STEPS = (0.1, 0.15, 0.25, 0.4, 0.6, 1.0)
@@ -71,8 +72,8 @@ def run(scale: str) -> dict[str, Any]:
                 _timed(figures, part.__name__, functools.partial(part, stored, matrix, figures))
             np.save(Path(folder) / "matrix.npy", matrix)
             _timed(figures, "codecs", lambda: _codecs(Path(folder) / "matrix.npy", figures))
-        _timed(figures, "single", lambda: _single(Path(folder), SINGLE_FACTORS[scale]))
-        _timed(figures, "edges", lambda: edge_figures(stored))
+            _timed(figures, "single", lambda: _single(Path(folder)))
+            _timed(figures, "edges", lambda: edge_figures(stored))
         figures |= slit_figures()
         _timed(figures, "seams", lambda: seam_figures(stored))
         _timed(figures, "thin", thin_figures)
@@ -279,7 +280,7 @@ def _codecs(matrix: Path, figures: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _single(folder: Path, factors: tuple[int, ...]) -> dict[str, Any]:
+def _single(folder: Path) -> dict[str, Any]:
     """One PCA of everything (Wang et al.) against clusters, by size of the mesh.
 
     Both at the error of the graph's own setting, by the same coder: one cluster against as many
@@ -293,7 +294,7 @@ def _single(folder: Path, factors: tuple[int, ...]) -> dict[str, Any]:
         "single_pca_values": {},
         "clusters_values": {},
     }
-    for factor in factors:
+    for factor in SINGLE_FACTORS:
         store = Workspace(folder / f"{factor}x").store
         made = store.open(SSDF.slot("triangle_clusters", {"scene": SCENE}))
         compressed = store.open(SSDF.slot("ssdf_basis", {"scene": SCENE}))
