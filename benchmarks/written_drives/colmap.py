@@ -174,7 +174,8 @@ def _reconstruction(
             for image in images:
                 made.add_image(image)
             made.register_frame(50 - instant)
-    made.add_point3D(np.array([1.0, 2.0, 3.0]), pycolmap.Track(), np.zeros((3, 1), np.uint8))
+    colour: Any = np.zeros((3, 1), np.uint8)
+    made.add_point3D(np.array([1.0, 2.0, 3.0]), pycolmap.Track(), colour)
     return made
 
 

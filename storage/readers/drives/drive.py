@@ -16,6 +16,7 @@ from storage.readers.drives.formats import read_recording
 from storage.readers.drives.headers import check_size, photograph_size
 from storage.readers.drives.instants import Instant, instants, with_absent
 from storage.readers.drives.lenses import panorama_views, pinhole_of
+from storage.readers.drives.naming import by_number
 from storage.readers.drives.recordings import (
     PANORAMA,
     PINHOLE,
@@ -26,7 +27,7 @@ from storage.readers.drives.recordings import (
     listed,
     shown_number,
 )
-from storage.readers.drives.rigs import check_rig, check_way
+from storage.readers.drives.rigs import LooseRig, check_rig, check_way
 
 FEWEST_CAMERAS = 1
 MOST_CAMERAS = 500
@@ -56,7 +57,23 @@ def read_drive(path: str | PathLike[str]) -> Drive:
 
 
 def drive_of(recording: Recording) -> Drive:
-    """The drive of a recording; raises BadInput as :func:`read_drive`."""
+    """The drive of a recording; raises BadInput as :func:`read_drive`.
+
+    Cameras that were guessed from names and are no rig are one camera, its photographs in the order
+    of their names.
+    """
+    try:
+        return _drive(recording)
+    except LooseRig:
+        if not recording.guessed:
+            raise
+    frames = sorted(recording.frames, key=lambda frame: by_number(str(frame.photograph)))
+    one = [frame._replace(camera="camera", time=float(row)) for row, frame in enumerate(frames)]
+    note = "By their poses the cameras of the files' names are no rig: they are read as one camera."
+    return _drive(recording._replace(frames=one, notes=(*recording.notes, note)))
+
+
+def _drive(recording: Recording) -> Drive:
     file = recording.file
     frames = [view for frame in recording.frames for view in panorama_views(frame)]
     moments = instants(file, frames, recording.spread)
