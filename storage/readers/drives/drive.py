@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -78,9 +78,10 @@ def _drive(recording: Recording) -> Drive:
     frames = [view for frame in recording.frames for view in panorama_views(frame)]
     moments = instants(file, frames, recording.spread)
     _check_numbers(file, frames, moments)
-    frames, missing = _those_there(frames)
+    listed_files = dict.fromkeys(frame.photograph for frame in frames)
+    frames = [frame for frame in frames if os.path.exists(frame.photograph)]
     moments = instants(file, frames, recording.spread)
-    _check_numbers(file, frames, moments)
+    missing = _missing(listed_files, frames, moments)
     names = sorted({frame.camera for frame in frames})
     poses = _poses(moments, names)
     if not np.isnan(poses).any():
@@ -129,19 +130,21 @@ def _check_numbers(file: Path, frames: Sequence[Frame], moments: Sequence[Instan
         raise BadInput(file, "number of poses", found, "a pose of each photograph, or of none")
 
 
-def _those_there(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
-    """The frames whose photographs are there, and what is to be said of the others."""
-    there = [frame for frame in frames if os.path.exists(frame.photograph)]
-    lost = {frame.photograph for frame in frames} - {frame.photograph for frame in there}
+def _missing(
+    files: Collection[Path], there: Sequence[Frame], moments: Sequence[Instant]
+) -> list[str]:
+    """What is to be said of photographs that are listed and not there."""
+    lost = set(files) - {frame.photograph for frame in there}
     if not lost:
-        return there, []
+        return []
     first = min(lost)
-    if len({frame.time for frame in there}) < FEWEST_INSTANTS:
+    if len(moments) < FEWEST_INSTANTS:
         photograph_size(first)  # says that it is missing
-    total = len({frame.photograph for frame in frames})
     are = "is" if len(lost) == 1 else "are"
-    said = f"{len(lost)} of {total} photographs {are} not there and left out (the first is "
-    return there, [f"{said}{shortened(first.name, 40)})."]
+    return [
+        f"{len(lost)} of {len(files)} photographs {are} not there and left out (the first is "
+        f"{shortened(first.name, 40)})."
+    ]
 
 
 def _poses(moments: Sequence[Instant], names: Sequence[str]) -> NDArray[np.float64]:
