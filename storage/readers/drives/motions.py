@@ -26,7 +26,7 @@ def rotation(
     largest = np.abs(matrix).max()
     # Divided first: squares of large entries overflow, those of small ones vanish.
     scaled = matrix / largest if 1e-150 < largest < np.inf else np.zeros((3, 3))
-    determinant = np.linalg.det(scaled)
+    determinant = float(scaled[:, 0] @ np.cross(scaled[:, 1], scaled[:, 2]))
     if abs(determinant) < 1e-9:
         raise BadInput(file, field, "no rotation (its axes lie in a plane)", expected)
     scale = np.cbrt(abs(determinant))

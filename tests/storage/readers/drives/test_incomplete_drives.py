@@ -34,7 +34,7 @@ def said(drive: Drive) -> str:
     return " ".join(drive.notes)
 
 
-# --- Photographs that are not there ----------------------------------------------------------------
+# --- Photographs that are not there ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("lost", ["file", "frame"])
@@ -102,7 +102,7 @@ def test_one_camera_is_a_drive(tmp_path: Path) -> None:
     assert drive.notes == ()
 
 
-# --- Units ------------------------------------------------------------------------------------------
+# --- Units ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("unit", [1e-4, 1e-3, 1.0, 1e3])
@@ -131,7 +131,7 @@ def test_a_parked_car_is_one_where_the_unit_is_known(tmp_path: Path) -> None:
         read_drive(path)
 
 
-# --- Photographs that are not alike ------------------------------------------------------------------
+# --- Photographs that are not alike ---------------------------------------------------------------
 
 
 def test_cameras_of_different_sizes_are_padded_with_black(tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ def test_masks(tmp_path: Path) -> None:
     assert read_masks(read_drive(written(tmp_path / "other")), 0) is None
 
 
-# --- Rigs that are none --------------------------------------------------------------------------------
+# --- Rigs that are none ---------------------------------------------------------------------------
 
 
 def test_folders_that_are_no_rig_are_one_camera(tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_a_rig_whose_cameras_are_released_one_after_the_other(tmp_path: Path) ->
         read_drive(path)
 
 
-# --- Recordings without poses or lenses -----------------------------------------------------------------
+# --- Recordings without poses or lenses -----------------------------------------------------------
 
 
 def frames(folder: Path, pose: NDArray[np.float64] | None, lens: Lens | None) -> list[Frame]:

@@ -35,7 +35,8 @@ def told(*names: str) -> list[tuple[str, float]]:
         (["b.png", "a.png", "c.png"], [("camera", 1), ("camera", 0), ("camera", 2)]),
         (["IMG_20240131_235959.jpg", "IMG_20240201_000001.jpg", "IMG_20240201_000004.jpg"],
          [("camera", 0), ("camera", 1), ("camera", 2)]),
-        (["x/a2.png", "x/a10.png", "x/b7.png", "x/a2.jpg"], [("x", 1), ("x", 2), ("x", 3), ("x", 0)]),
+        (["x/a2.png", "x/a10.png", "x/b7.png", "x/a2.jpg"],
+         [("x", 1), ("x", 2), ("x", 3), ("x", 0)]),
         # Backslashes, points, endings that are none.
         ([".\\images\\a1", "./images/a2.JPG"], [("images/a", 1), ("images/a", 2)]),
         (["shot.0001", "shot.0002"], [("shot", 1), ("shot", 2)]),

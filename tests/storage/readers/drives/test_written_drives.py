@@ -32,7 +32,7 @@ def test_what_is_written_comes_back(form: str, tmp_path: Path) -> None:
         pictures = [[picture.copy() for picture in row] for row in written.pictures]
         pictures[1][0][3, 4, 1] ^= 1
         assert comparing._mismatches(written._replace(pictures=pictures)) == 1
-    shifted = written.intrinsics + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+    shifted = written.intrinsics + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
     total = TOTALS.get(form, 12)
     assert comparing._mismatches(written._replace(intrinsics=shifted)) == total
     assert comparing._mismatches(written._replace(notes=("nobody says this",))) == total
@@ -63,7 +63,8 @@ def test_each_format_is_written_and_named(tmp_path: Path) -> None:
     assert set(found.values()) == {known.name for known in FORMATS}
     assert len(FORMS) >= 12
     for known in FORMATS:
-        assert known.known_by and known.sentence.endswith(".")
+        assert known.known_by
+        assert known.sentence.endswith(".")
 
 
 def test_the_most_specific_format_is_read(tmp_path: Path) -> None:
@@ -76,8 +77,9 @@ def test_the_most_specific_format_is_read(tmp_path: Path) -> None:
 
 
 def test_units_and_up_are_known_where_the_format_says_so(tmp_path: Path) -> None:
-    for form, known in (("transforms_fields", False), ("colmap_text", False),
-                        ("kitti_sequence", True), ("kitti_raw", True), ("nuscenes", True)):  # fmt: skip
+    known_of = dict.fromkeys(("transforms_fields", "colmap_text"), False)
+    known_of |= dict.fromkeys(("kitti_sequence", "kitti_raw", "nuscenes"), True)
+    for form, known in known_of.items():
         drive = read_drive(FORMS[form](tmp_path / form).path)
         assert drive.metric is known, form
         assert drive.up_known is known, form
