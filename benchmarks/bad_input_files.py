@@ -70,6 +70,7 @@ def valid_cases() -> list[Case]:
         *(Case(name, "btf_file", name, {name: data}) for name, data in btf_files().items()),
         drive("png"),
         drive("jpg"),
+        *_written_drives(),
         *(Case(name, "package", name, {name: data}) for name, data in good_packages().items()),
     ]
 
@@ -356,6 +357,26 @@ def drive(ending: str) -> Case:
     }
     files["transforms.json"] = json.dumps(drive_transforms(ending)).encode()
     return Case(f"{ending}.drive", "drive", "", files)
+
+
+def _written_drives() -> list[Case]:
+    """A drive in forms of each format: text, tables, binary."""
+    from benchmarks.written_drives import FORMS
+
+    cases = []
+    for form in (
+        "transforms_nerfstudio", "transforms_panorama", "colmap_rig_binary", "colmap_older_text",
+        "kitti_sequence", "kitti_raw", "nuscenes",
+    ):  # fmt: skip
+        with tempfile.TemporaryDirectory() as folder:
+            root = FORMS[form](Path(folder) / "drive").path
+            files = {
+                str(file.relative_to(root)): file.read_bytes()
+                for file in sorted(root.rglob("*"))
+                if file.is_file()
+            }
+        cases.append(Case(form, "drive", "", files))
+    return cases
 
 
 def with_png_checksums(data: bytes) -> bytes:

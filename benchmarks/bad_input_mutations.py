@@ -34,7 +34,8 @@ def mutated(case: Case, chance: random.Random) -> Case:
     """The case with one of its files changed, once or a few times."""
     name = case.entry or chance.choice(sorted(case.files))
     if case.reader == "drive" and chance.random() < 0.6:
-        name = "transforms.json"
+        described = sorted(name for name in case.files if not name.endswith((".png", ".jpg")))
+        name = chance.choice(described)
     if case.reader == "scene" and chance.random() < 0.3 and case.entry == "mesh.obj":
         name = "mesh.mtl"
     data = case.files[name]
@@ -49,7 +50,7 @@ def _mutation_of(name: str, chance: random.Random) -> Callable[[bytes, random.Ra
     special = _SPECIAL.get(ending)
     if special and chance.random() < 0.6:
         return special
-    if ending in ("ply", "obj", "mtl", "csv", "json", "hdr") and chance.random() < 0.6:
+    if ending in ("ply", "obj", "mtl", "csv", "json", "hdr", "txt") and chance.random() < 0.6:
         return _numbers
     return chance.choice(_ON_BYTES)
 

@@ -48,7 +48,7 @@ def write_text(folder: Path) -> Written:
 
 def write_two_pieces(folder: Path) -> Written:
     """Two models of one capture, the first of them the smaller; distorted (SIMPLE_RADIAL)."""
-    focal, k1 = 42.0, -0.08
+    focal, k1 = 42.0, -0.2
     k = np.array([[focal, 0, K[0, 2]], [0, focal, K[1, 2]], [0, 0, 1]])
 
     def bend(points: Array) -> Array:
@@ -174,7 +174,8 @@ def _reconstruction(
             for image in images:
                 made.add_image(image)
             made.register_frame(50 - instant)
-    made.add_point3D(np.array([1.0, 2.0, 3.0]), pycolmap.Track(), np.zeros((3, 1), np.uint8))
+    colour: Any = np.zeros((3, 1), np.uint8)
+    made.add_point3D(np.array([1.0, 2.0, 3.0]), pycolmap.Track(), colour)
     return made
 
 

@@ -37,7 +37,9 @@ def write_sequence(folder: Path) -> Written:
     beyond = [poses[-1] @ rigid(np.eye(3), [0, 0, metres]) for metres in (1, 2, 3)]
     _text(folder / "poses" / "07.txt", [_row(pose[:3]) for pose in (*poses, *beyond)])
     _text(sequence / "times.txt", [f"{0.1037 * i:e}" for i in range(len(poses) + 3)])
-    return _saved(sequence, ("image_2", "image_3"), "{instant:06d}.png", world, ("9 poses",))
+    folders = ("image_2", "image_3")
+    written = _saved(sequence, folders, "{instant:06d}.png", world, ("has 9 poses",))
+    return written._replace(path=folder)
 
 
 def write_other_program(folder: Path, comma: str = "") -> Written:

@@ -19,6 +19,7 @@ from storage.readers.drives.colmap_models import (
     read_points,
     read_rig_frames,
 )
+from storage.readers.drives.motions import inverse, place, quaternion_rotation, rigid
 from storage.readers.drives.naming import by_number, cameras_and_times
 from storage.readers.drives.recordings import (
     FISHEYE,
@@ -30,17 +31,12 @@ from storage.readers.drives.recordings import (
     check_lens,
     counted,
     file_inside,
-    inverse,
-    place,
-    quaternion_rotation,
-    rigid,
 )
 
 _MODEL_FOLDERS = (".", "sparse", "colmap/sparse", "colmap", "dense/sparse", "undistorted/sparse")
 _PICTURE_FOLDERS = ("images", "image", "imgs", "pictures", ".")
 _ENDINGS = (".bin", ".txt")  # COLMAP itself prefers the binary one
 _MOST_MODELS = 1000
-_LEVELS = 3  # from colmap/sparse/0 up to what holds images
 
 
 def find_colmap(path: Path) -> Path | None:
@@ -56,7 +52,7 @@ def find_colmap(path: Path) -> Path | None:
     return None
 
 
-def read_colmap(file: Path) -> Recording:
+def read_colmap(file: Path, root: Path) -> Recording:
     """A model's photographs. The unit and the up axis are COLMAP's own, which nobody knows.
 
     Where the model has rigs, a frame of a rig is an instant; otherwise names tell (folder or
@@ -70,14 +66,15 @@ def read_colmap(file: Path) -> Recording:
     cameras, images = read_cameras(cameras_file), read_images(file)
     if not images:
         raise BadInput(file, "number of images", "0", "at least 3 photographs with a pose")
-    pictures = _picture_folder(file, images)
+    pictures = _picture_folder(file, root, images)
     lenses = {}
     for number in {image.camera for image in images}:
         if number not in cameras:
             raise BadInput(file, f"camera {number}", "missing", f"a camera in {cameras_file.name}")
         lenses[number] = _lens(cameras_file, number, cameras[number])
     frames = []
-    for image, (camera, time) in zip(images, _told(folder, ending, images), strict=True):
+    told, guessed = _told(folder, ending, images)
+    for image, (camera, time) in zip(images, told, strict=True):
         field = f"pose of image {image.number}"
         turn = quaternion_rotation(file, field, image.quaternion)
         pose = inverse(rigid(turn, place(file, field, image.translation)))
@@ -85,7 +82,8 @@ def read_colmap(file: Path) -> Recording:
         frames.append(Frame(camera, time, photograph, pose, lenses[image.camera]))
     points_file = folder / f"points3D{ending}"
     points = read_points(points_file) if points_file.exists() else np.empty((0, 3))
-    return Recording(file, frames, notes=tuple(_notes(file, len(images))), points=points)
+    notes = tuple(_notes(file, len(images)))
+    return Recording(file, frames, notes=notes, guessed=guessed, points=points)
 
 
 def _images_file(folder: Path) -> Path | None:
@@ -112,19 +110,20 @@ def _size(file: Path) -> int:
         return -1
 
 
-def _picture_folder(file: Path, images: Sequence[ColmapImage]) -> Path:
+def _picture_folder(file: Path, root: Path, images: Sequence[ColmapImage]) -> Path:
     """Where the photographs lie: the nearest of the usual folders that has most of them."""
     some = images[:: max(len(images) // 64, 1)]
-    base, found, most = file.parent, None, 0
-    for _ in range(_LEVELS + 1):
+    found, most = None, 0
+    for base in (file.parent, *file.parent.parents):
         for name in _PICTURE_FOLDERS:
             there = sum(os.path.exists(base / name / image.name) for image in some)
             if there > most:
                 found, most = base / name, there
-        base = base.parent
+        if base == root:
+            break
     if found is None:
         first = shortened(images[0].name, 40)
-        expected = f"a folder images with {first}, beside the model or sparse"
+        expected = f"a folder images with {first}, in the folder that was given"
         raise BadInput(file, "folder of its photographs", "nowhere", expected)
     return found
 
@@ -155,8 +154,11 @@ def _lens(file: Path, number: int, camera: ColmapCamera) -> Lens:
     return check_lens(file, lens, lambda key: f"{key} of camera {number}", corner=0.5)
 
 
-def _told(folder: Path, ending: str, images: Sequence[ColmapImage]) -> list[tuple[str, float]]:
-    """Camera and time of each image, by its rig's frame if there are rigs of several cameras."""
+def _told(
+    folder: Path, ending: str, images: Sequence[ColmapImage]
+) -> tuple[list[tuple[str, float]], bool]:
+    """Camera and time of each image, by its rig's frame if there are rigs of several cameras; and
+    whether they are guessed."""
     named = cameras_and_times([image.name for image in images])
     file = folder / f"frames{ending}"
     frame_of = read_rig_frames(file) if file.exists() else {}
@@ -164,7 +166,7 @@ def _told(folder: Path, ending: str, images: Sequence[ColmapImage]) -> list[tupl
     for row, image in enumerate(images):
         members[frame_of.get(image.number, -1 - image.number)].append(row)
     if all(len(rows) == 1 for rows in members.values()):
-        return named
+        return named, True
     # The frames' own numbers have no order: that of the names has.
     order = sorted(members.values(), key=lambda rows: min(by_number(images[r].name) for r in rows))
     times = [{named[row][1] for row in rows} for rows in order]
@@ -176,7 +178,7 @@ def _told(folder: Path, ending: str, images: Sequence[ColmapImage]) -> list[tupl
         for row in rows:
             camera = named[row][0] if one_to_one else f"camera {images[row].camera}"
             told[row] = camera, named[row][1] if numbered else float(count)
-    return told
+    return told, False
 
 
 def _notes(file: Path, count: int) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from storage.readers.drives.formats import read_recording
 from storage.readers.drives.headers import check_size, photograph_size
 from storage.readers.drives.instants import Instant, instants, with_absent
 from storage.readers.drives.lenses import panorama_views, pinhole_of
+from storage.readers.drives.naming import by_number
 from storage.readers.drives.recordings import (
     PANORAMA,
     PINHOLE,
@@ -26,7 +27,7 @@ from storage.readers.drives.recordings import (
     listed,
     shown_number,
 )
-from storage.readers.drives.rigs import check_rig, check_way
+from storage.readers.drives.rigs import LooseRig, check_rig, check_way
 
 FEWEST_CAMERAS = 1
 MOST_CAMERAS = 500
@@ -56,14 +57,31 @@ def read_drive(path: str | PathLike[str]) -> Drive:
 
 
 def drive_of(recording: Recording) -> Drive:
-    """The drive of a recording; raises BadInput as :func:`read_drive`."""
+    """The drive of a recording; raises BadInput as :func:`read_drive`.
+
+    Cameras that were guessed from names and are no rig are one camera, its photographs in the order
+    of their names.
+    """
+    try:
+        return _drive(recording)
+    except LooseRig:
+        if not recording.guessed:
+            raise
+    frames = sorted(recording.frames, key=lambda frame: by_number(str(frame.photograph)))
+    one = [frame._replace(camera="camera", time=float(row)) for row, frame in enumerate(frames)]
+    note = "By their poses the cameras of the files' names are no rig: they are read as one camera."
+    return _drive(recording._replace(frames=one, notes=(*recording.notes, note)))
+
+
+def _drive(recording: Recording) -> Drive:
     file = recording.file
     frames = [view for frame in recording.frames for view in panorama_views(frame)]
     moments = instants(file, frames, recording.spread)
     _check_numbers(file, frames, moments)
-    frames, missing = _those_there(frames)
+    listed_files = dict.fromkeys(frame.photograph for frame in frames)
+    frames = [frame for frame in frames if os.path.exists(frame.photograph)]
     moments = instants(file, frames, recording.spread)
-    _check_numbers(file, frames, moments)
+    missing = _missing(listed_files, frames, moments)
     names = sorted({frame.camera for frame in frames})
     poses = _poses(moments, names)
     if not np.isnan(poses).any():
@@ -114,19 +132,21 @@ def _check_numbers(file: Path, frames: Sequence[Frame], moments: Sequence[Instan
         raise BadInput(file, "number of poses", found, "a pose of each photograph, or of none")
 
 
-def _those_there(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
-    """The frames whose photographs are there, and what is to be said of the others."""
-    there = [frame for frame in frames if os.path.exists(frame.photograph)]
-    lost = {frame.photograph for frame in frames} - {frame.photograph for frame in there}
+def _missing(
+    files: Collection[Path], there: Sequence[Frame], moments: Sequence[Instant]
+) -> list[str]:
+    """What is to be said of photographs that are listed and not there."""
+    lost = set(files) - {frame.photograph for frame in there}
     if not lost:
-        return there, []
+        return []
     first = min(lost)
-    if len({frame.time for frame in there}) < FEWEST_INSTANTS:
+    if len(moments) < FEWEST_INSTANTS:
         photograph_size(first)  # says that it is missing
-    total = len({frame.photograph for frame in frames})
     are = "is" if len(lost) == 1 else "are"
-    said = f"{len(lost)} of {total} photographs {are} not there and left out (the first is "
-    return there, [f"{said}{shortened(first.name, 40)})."]
+    return [
+        f"{len(lost)} of {len(files)} photographs {are} not there and left out (the first is "
+        f"{shortened(first.name, 40)})."
+    ]
 
 
 def _poses(moments: Sequence[Instant], names: Sequence[str]) -> NDArray[np.float64]:

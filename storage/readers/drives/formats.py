@@ -19,6 +19,7 @@ from storage.readers.drives.unposed import (
     read_film_recording,
     read_photographs_recording,
 )
+from storage.readers.opening import unreadable
 from storage.readers.photograph_folders import FEWEST
 
 
@@ -27,15 +28,15 @@ class Format(NamedTuple):
 
     known_by: the files by which it is told from others.
     sentence: what of it is read.
-    find: the file that a path is known by, None where it is in another format.
-    read: that file's recording.
+    find: the file (or folder) that a folder is known by, None where it is in another format.
+    read: the recording of what was found, in the folder: nothing outside of that is looked at.
     """
 
     name: str
     known_by: str
     sentence: str
     find: Callable[[Path], Path | None]
-    read: Callable[[Path], Recording]
+    read: Callable[[Path, Path], Recording]
 
 
 FORMATS = (
@@ -99,10 +100,17 @@ FORMATS = (
 
 
 def read_recording(path: Path) -> Recording:
-    """The recording of a path, in the first format that it is in; others are named in a note.
+    """The recording of a folder, in the first format that it is in; others are named in a note.
 
     Raises BadInput for what is missing or in no format, and as the format's reader does.
     """
+    try:
+        return _recording(path)
+    except OSError as error:  # a folder that may not be listed, above all
+        raise unreadable(Path(error.filename or path), error, "files that can be read") from error
+
+
+def _recording(path: Path) -> Recording:
     found = [(known, file) for known in FORMATS if (file := known.find(path)) is not None]
     if not found:
         what = "a folder without any of these" if path.is_dir() else "a file"
@@ -113,7 +121,7 @@ def read_recording(path: Path) -> Recording:
             "one of " + "; ".join(f"{known.known_by} ({known.name})" for known in FORMATS),
         )
     known, file = found[0]
-    recording = known.read(file)
+    recording = known.read(file, path)
     others = ", ".join(other.name for other, _ in found[1:])
     if not others:
         return recording

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
-from storage.readers.drives.recordings import Frame, inverse, shown_number
+from storage.readers.drives.motions import inverse
+from storage.readers.drives.recordings import Frame, shown_number
 
 Instant = dict[str, Frame]
 """The photographs of one time by camera."""

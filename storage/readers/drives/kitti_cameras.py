@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
 from storage.readers.drives.headers import ENDINGS, photograph_size
+from storage.readers.drives.motions import place, rigid
 from storage.readers.drives.recordings import (
     MOST_FRAMES,
     Lens,
     check_count,
     check_lens,
     pinhole_lens,
-    place,
-    rigid,
 )
 
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

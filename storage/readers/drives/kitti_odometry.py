@@ -20,15 +20,8 @@ from storage.readers.drives.kitti_cameras import (
     numbered_pictures,
     rectified_camera,
 )
-from storage.readers.drives.recordings import (
-    Frame,
-    Recording,
-    check_count,
-    counted,
-    place,
-    rigid,
-    rotation,
-)
+from storage.readers.drives.motions import place, rigid, rotation
+from storage.readers.drives.recordings import Frame, Recording, check_count, counted
 from storage.readers.drives.text_tables import Table
 
 _CALIBRATION = "calib.txt"
@@ -36,19 +29,23 @@ _FOLDERS = {
     "image_0": 0, "image_1": 1, "image_2": 2, "image_3": 3, "image_l": 0, "image_r": 1,
 }  # fmt: skip
 """Folders of pictures and which projection is theirs."""
+_MOST_SEQUENCES = 100
 _EXPECTED = (
     "a KITTI sequence with calib.txt, image_0 to image_3 (or image_l, image_r) and poses.txt"
 )
 
 
 def find_kitti_odometry(path: Path) -> Path | None:
-    """The calibration of a folder that has pictures as KITTI has them beside it."""
-    file = path / _CALIBRATION
-    pictures = any((path / name).is_dir() for name in _FOLDERS)
-    return file if pictures and file.is_file() else None
+    """The calibration of a sequence, which has pictures beside it: of the folder itself, or of the
+    benchmark's, where poses lie apart; there of one with poses and of those the longest."""
+    own = path / _CALIBRATION
+    if _has_pictures(path) and own.is_file():
+        return own
+    sequences = [folder / _CALIBRATION for folder in _sequences(path)]
+    return max(sequences, key=lambda file: _worth(file, path), default=None)
 
 
-def read_kitti_odometry(file: Path) -> Recording:
+def read_kitti_odometry(file: Path, root: Path) -> Recording:
     """A sequence: the pictures that are there, with poses where there are any.
 
     Poses are those of the first camera, the first of them at zero; the world is turned so that z is
@@ -64,7 +61,7 @@ def read_kitti_odometry(file: Path) -> Recording:
     calibration = Table(file, _EXPECTED)
     cameras = {name: _camera(calibration, name, own) for name, own in pictures.items()}
     numbers = sorted(set().union(*pictures.values()))
-    poses, pose_notes = _poses(folder, numbers)
+    poses, pose_notes = _poses(folder, root, numbers)
     times, time_notes = _times(folder, numbers)
     frames = [
         _frame(name, number, times, poses, cameras[name], own[number])
@@ -76,7 +73,26 @@ def read_kitti_odometry(file: Path) -> Recording:
         raise BadInput(file, "number of pictures with a pose and a time", "0", _EXPECTED)
     check_count(file, len(frames))
     notes = [*calibration.notes, *pose_notes, *time_notes]
+    others = len(_sequences(root)) - 1
+    if folder != root and others > 0:
+        notes.insert(0, f"Sequence {folder.name} is read; {counted(others, 'other sequence')} not.")
     return Recording(file, frames, metric=True, up_known=True, notes=tuple(notes))
+
+
+def _has_pictures(folder: Path) -> bool:
+    return any((folder / name).is_dir() for name in _FOLDERS)
+
+
+def _sequences(root: Path) -> list[Path]:
+    """The sequences of the whole benchmark's folder."""
+    folder = root / "sequences"
+    found = sorted(folder.iterdir())[:_MOST_SEQUENCES] if folder.is_dir() else []
+    return [own for own in found if _has_pictures(own) and (own / _CALIBRATION).is_file()]
+
+
+def _worth(file: Path, root: Path) -> tuple[bool, int]:
+    count = max(len(numbered_pictures(file.parent / name)) for name in _FOLDERS)
+    return _poses_file(file.parent, root) is not None, count
 
 
 def _frame(
@@ -107,12 +123,14 @@ def _camera(table: Table, folder: str, pictures: Mapping[int, Path]) -> Rectifie
 
 
 def _poses(
-    folder: Path, numbers: list[int]
+    folder: Path, root: Path, numbers: list[int]
 ) -> tuple[dict[int, NDArray[np.float64]] | None, list[str]]:
     """Poses of the first camera by the picture's number, z up; None where there is no file."""
-    file = _poses_file(folder)
+    file = _poses_file(folder, root)
     if file is None:
-        return None, ["Without poses.txt: poses are to be found."]
+        apart = folder.parent.parent / "poses" / f"{folder.name}.txt"
+        there = f"; {apart.name} lies outside of the folder" if apart.is_file() else ""
+        return None, [f"Without poses.txt: poses are to be found{there}."]
     table = Table(file, _EXPECTED)
     lines = [(row, line) for row, line in enumerate(table.lines) if line]
     check_count(file, len(lines))
@@ -145,10 +163,9 @@ def _poses(
     return poses, notes
 
 
-def _poses_file(folder: Path) -> Path | None:
-    own = (folder / "poses.txt", folder / "poses" / f"{folder.name}.txt")
-    apart = folder.parent.parent / "poses" / f"{folder.name}.txt"
-    return next((file for file in (*own, apart) if file.is_file()), None)
+def _poses_file(folder: Path, root: Path) -> Path | None:
+    places = (folder / "poses.txt", *(own / f"poses/{folder.name}.txt" for own in (folder, root)))
+    return next((file for file in places if file.is_file()), None)
 
 
 def _times(folder: Path, numbers: list[int]) -> tuple[dict[int, float], list[str]]:

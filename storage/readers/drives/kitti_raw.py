@@ -16,16 +16,8 @@ from numpy.typing import NDArray
 
 from storage.readers.bad_input import BadInput
 from storage.readers.drives.kitti_cameras import numbered_pictures, rectified_camera
-from storage.readers.drives.recordings import (
-    Frame,
-    Recording,
-    check_count,
-    counted,
-    inverse,
-    place,
-    rigid,
-    rotation,
-)
+from storage.readers.drives.motions import inverse, place, rigid, rotation
+from storage.readers.drives.recordings import Frame, Recording, check_count, counted
 from storage.readers.drives.text_tables import Table
 
 EARTH_RADIUS = 6_378_137.0
@@ -45,20 +37,20 @@ _STAMP = re.compile(r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d)(\.\d+)?")
 
 
 def find_kitti_raw(path: Path) -> Path | None:
-    """The drive of a day's folder, the one with most pictures, or of a drive's own folder."""
-    if _is_drive(path) and (path.parent / _CAMERAS).is_file():
+    """The drive of a day's folder, the one with most pictures; or the folder as one itself."""
+    if _is_drive(path):
         return path
     drives = _drives(path) if (path / _CAMERAS).is_file() else []
     return max(drives, key=_pictures, default=None)
 
 
-def read_kitti_raw(drive: Path) -> Recording:
-    """A drive's pictures, z up and in metres; ``drive``: its folder, inside that of its day.
+def read_kitti_raw(drive: Path, day: Path) -> Recording:
+    """A drive's pictures, z up and in metres; ``day``: the folder with the calibration, which
+    holds the drive or is it.
 
     Raises BadInput for files that are missing, numbers that are missing or none, matrices that are
     no rotations or projections, and a drive without pictures.
     """
-    day = drive.parent
     file = day / _CAMERAS
     pictures = {
         name: found for name in _FOLDERS if (found := numbered_pictures(drive / name / "data"))
@@ -93,7 +85,7 @@ def read_kitti_raw(drive: Path) -> Recording:
     lost = len(numbers) - len(imu)
     if lost:
         notes.append(f"{counted(lost, 'instant')} without a packet in oxts/data left out.")
-    others = [other.name for other in _drives(day) if other != drive]
+    others = [other for other in _drives(day) if other != drive]
     if others:
         notes.append(f"{drive.name} is read; {counted(len(others), 'drive')} beside it not.")
     notes.append("The world is KITTI's: east, north and up from the first place.")

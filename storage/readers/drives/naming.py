@@ -35,13 +35,17 @@ def cameras_and_times(names: Sequence[str]) -> list[tuple[str, float]]:
         chosen = _changing(numbers, stems[rows[0]].rfind("/"))
         for row, matches in zip(rows, numbers, strict=True):
             found[row] = _camera_and_time(stems[row], matches, chosen)
-    return _one_camera_a_folder(stems, found)
+    return _one_camera_a_folder(names, stems, found)
 
 
-def by_number(name: str) -> list[tuple[int, str]]:
+def by_number(name: str) -> list[tuple[bool, int, str]]:
     """What sorts names as people do: "b2" before "b10"."""
     parts = re.split(r"(\d+)", name)
-    return [(int(p[:_LONGEST]), p) if p.isdecimal() else (-1, p) for p in parts if p]
+    return [
+        (False, int(part[:_LONGEST]), part) if part.isdecimal() else (True, 0, part)
+        for part in parts
+        if part
+    ]
 
 
 def _stem(name: str) -> str:
@@ -78,7 +82,7 @@ def _camera_and_time(
 
 
 def _one_camera_a_folder(
-    stems: Sequence[str], found: Sequence[tuple[str, float]]
+    names: Sequence[str], stems: Sequence[str], found: Sequence[tuple[str, float]]
 ) -> list[tuple[str, float]]:
     folders: dict[str, list[int]] = defaultdict(list)
     for row, stem in enumerate(stems):
@@ -92,7 +96,7 @@ def _one_camera_a_folder(
         numbered = all(time == time for time in times)
         if numbered and together and len(pairs) == len(rows):
             continue
-        ordered = sorted(rows, key=lambda row: by_number(stems[row]))
+        ordered = sorted(rows, key=lambda row: by_number(names[row]))
         for count, row in enumerate(ordered):
             told[row] = (folder or "camera", float(count))
     return told

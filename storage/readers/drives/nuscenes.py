@@ -25,6 +25,7 @@ from storage.readers.drives.json_fields import (
     required,
 )
 from storage.readers.drives.json_rows import json_rows
+from storage.readers.drives.motions import place, quaternion_rotation, rigid
 from storage.readers.drives.recordings import (
     Frame,
     Recording,
@@ -33,9 +34,6 @@ from storage.readers.drives.recordings import (
     counted,
     file_inside,
     pinhole_lens,
-    place,
-    quaternion_rotation,
-    rigid,
     shown_number,
 )
 
@@ -49,23 +47,22 @@ _Row = dict[str, Any]
 
 
 def find_nuscenes(path: Path) -> Path | None:
-    """The folder of tables: itself, or the one in a data set's folder."""
+    """The folder of tables in a data set's folder."""
     if not path.is_dir():
         return None
     inside = sorted(name for name in os.listdir(path) if name.startswith("v1."))[:20]
-    for folder in (path, *(path / name for name in inside)):
+    for folder in (path / name for name in inside):
         if all((folder / f"{table}.json").is_file() for table in _TABLES):
             return folder
     return None
 
 
-def read_nuscenes(tables: Path) -> Recording:
+def read_nuscenes(tables: Path, root: Path) -> Recording:
     """The scene of which most pictures are there, the longest of equal ones.
 
     Raises BadInput for tables that are missing, broken or refer to rows that are not there, for
     rotations and lenses that cannot be any, and for paths that leave the data set's folder.
     """
-    folder = tables.parent
     cameras = _cameras(tables)
     scene_of = {
         _text(tables, "sample", row, "token"): _text(tables, "sample", row, "scene_token")
@@ -74,7 +71,7 @@ def read_nuscenes(tables: Path) -> Recording:
     scenes = {_text(tables, "scene", row, "token"): row for row in _rows(tables, "scene")}
     if not scenes:
         raise BadInput(tables / "scene.json", "number of scenes", "0", "at least one scene")
-    counts = _pictures_there(tables, folder, set(cameras), scene_of)
+    counts = _pictures_there(tables, root, set(cameras), scene_of)
     chosen = max(scenes, key=lambda token: (counts[token], _samples(tables, scenes[token])))
     rows = [
         row
@@ -83,7 +80,7 @@ def read_nuscenes(tables: Path) -> Recording:
     ]
     check_count(tables / "sample_data.json", len(rows))
     poses = _ego_poses(tables, {row["ego_pose_token"] for row in rows})
-    frames = [_frame(tables, folder, row, cameras, poses) for row in rows]
+    frames = [_frame(tables, root, row, cameras, poses) for row in rows]
     notes = ["The world is nuScenes' map: metres, z up."]
     if len(scenes) > 1:
         name = shortened(str(scenes[chosen].get("name", chosen)), 40)

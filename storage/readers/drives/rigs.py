@@ -22,6 +22,10 @@ LARGEST_GAP = 20
 """The longest step from an instant to the next, in medians of all steps."""
 
 
+class LooseRig(BadInput):
+    """Cameras that are not on one car."""
+
+
 def check_way(
     file: Path, times: NDArray[np.float64], places: NDArray[np.float64], metric: bool
 ) -> float:
@@ -72,7 +76,7 @@ def check_rig(
     """``times`` (f, c), of each photograph, and ``places`` (f, c, 3), NaN where there is none;
     ``step``: the car's median one. Cameras at one place at all times are views of one.
 
-    Raises BadInput for cameras nearer to each other than a thousandth of a step, and for two whose
+    Raises LooseRig for cameras nearer to each other than a thousandth of a step, and for two whose
     distance changes by more than 5 % and more than the car drives between their photographs.
     """
     speed = _speeds(times, places)
@@ -86,12 +90,12 @@ def check_rig(
         at_near = f"{apart[near]:.4f} at time {_time(times[near])}"
         least = LEAST_BASELINE * step
         if np.nanmedian(apart) < least:
-            raise BadInput(file, field, at_near, f"at least {least:.2g}, or none")
+            raise LooseRig(file, field, at_near, f"at least {least:.2g}, or none")
         allowed = BASELINE_CHANGE * apart[near] + between[near] + between[far]
         if apart[far] - apart[near] > allowed + 1e-6 * step:
             found = f"{at_near} and {apart[far]:.4f} at time {_time(times[far])}"
             expected = f"a rigid rig (a change of at most {BASELINE_CHANGE:.0%})"
-            raise BadInput(file, field, found, expected)
+            raise LooseRig(file, field, found, expected)
 
 
 def _time(times: NDArray[np.float64]) -> str:

@@ -25,6 +25,7 @@ from storage.readers.drives.json_fields import (
     required,
     shown_json,
 )
+from storage.readers.drives.motions import inverse, place, rigid, rotation
 from storage.readers.drives.naming import cameras_and_times
 from storage.readers.drives.recordings import (
     Frame,
@@ -32,10 +33,6 @@ from storage.readers.drives.recordings import (
     check_count,
     counted,
     file_inside,
-    inverse,
-    place,
-    rigid,
-    rotation,
     shown_number,
 )
 from storage.readers.drives.transform_lenses import transform_lens
@@ -49,15 +46,13 @@ _SCALE_TOLERANCE = 1e-3  # of axes that are as long as they should be
 _NOT_READ = ("ply_file_path", "depth_file_path")
 
 
-def find_transforms(path: Path) -> Path | None:
-    """The file that a folder is known by; a path of the file itself does, too."""
-    if path.name in TRANSFORMS and path.is_file():
-        return path
-    return next((path / name for name in TRANSFORMS if (path / name).exists()), None)
+def find_transforms(folder: Path) -> Path | None:
+    """The file that a folder is known by."""
+    return next((folder / name for name in TRANSFORMS if (folder / name).exists()), None)
 
 
-def read_transforms(file: Path) -> Recording:
-    """The frames of `transforms.json`.
+def read_transforms(file: Path, folder: Path) -> Recording:
+    """The frames of `transforms.json`; ``folder``: where it is, with the photographs.
 
     What a lens has may stand with the frame, with the frame's camera under `cameras`, or at the
     top; the nearest is taken. A `camera` may be a name or a number: 1 and "1" are one camera.
@@ -97,10 +92,11 @@ def read_transforms(file: Path) -> Recording:
         )
     if scaled:
         notes.append(f"The axes of {counted(scaled, 'matrix')} were scaled: divided out.")
-    notes += _guessed(owns, len({frame.camera for frame in frames}))
+    guessed = _guessed(owns, len({frame.camera for frame in frames}))
+    notes += guessed
     notes += [f"{key} is not read." for key in _NOT_READ if any(key in own[0][1] for own in owns)]
     notes += [f"{key} is not read." for key in _NOT_READ if key in top]
-    return Recording(file, frames, notes=tuple(notes))
+    return Recording(file, frames, notes=tuple(notes), guessed=bool(guessed))
 
 
 def _guessed(owns: Sequence[Layers], cameras: int) -> list[str]:
