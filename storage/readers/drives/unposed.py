@@ -25,7 +25,7 @@ def find_film(path: Path) -> Path | None:
     return path if path.suffix.lower() in FILM_SUFFIXES and path.exists() else None
 
 
-def read_film_recording(file: Path) -> Recording:
+def read_film_recording(file: Path, given: Path) -> Recording:
     """All frames of a film; places of a GPX file of its name beside it, by the film's clock.
 
     Raises BadInput as :func:`read_film` and :func:`read_gpx`.
@@ -57,7 +57,7 @@ def find_photographs(path: Path) -> Path | None:
     return path if sum(1 for _, _ in zip(some, range(FEWEST), strict=False)) == FEWEST else None
 
 
-def read_photographs_recording(folder: Path) -> Recording:
+def read_photographs_recording(folder: Path, given: Path) -> Recording:
     """Photographs in the order of their names; focal length and places as EXIF has them.
 
     A focal length that EXIF does not tell well enough to be used is left to be found. Raises
