@@ -15,6 +15,7 @@ from os import PathLike
 from pathlib import Path
 
 from storage.readers.bad_input import BadInput
+from storage.readers.films import SUFFIXES as FILM_SUFFIXES
 from storage.readers.references import file_beside, spellings
 
 _TEXTURES = re.compile(r"(map_\w+|bump|disp|decal|refl|norm)", re.IGNORECASE)
@@ -28,8 +29,8 @@ def companions(path: str | PathLike[str]) -> list[Path]:
     """The files that a file refers to, and those that these refer to: those that are there.
 
     OBJ: the files of its ``mtllib`` lines, and the textures (``map_Kd`` …) that these name; PLY:
-    what ``comment TextureFile`` names; glTF and GLB: the files of buffers and images; of other
-    formats none. Absolute paths, each once, in the order of reference. Raises nothing: what is
+    what ``comment TextureFile`` names; glTF and GLB: the files of buffers and images; a film: the
+    GPX track of its name beside it; of other formats none. Absolute paths, each once, in the order of reference. Raises nothing: what is
     missing or cannot be read is the reader's to judge.
 
     >>> companions("nobody.obj")
@@ -56,7 +57,10 @@ def travel_name(file: Path, companion: Path) -> str:
 
 
 def _referred(file: Path, ending: str) -> list[Path]:
-    """The files that a file itself names and that are there."""
+    """The files that a file itself names and that are there; of a film its track."""
+    if ending in FILM_SUFFIXES:
+        track = file.with_suffix(".gpx")
+        return [track] if os.path.isfile(track) else []
     if ending not in _ENDINGS or not os.path.isfile(file):  # a pipe would block
         return []
     try:
