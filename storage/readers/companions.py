@@ -30,8 +30,8 @@ def companions(path: str | PathLike[str]) -> list[Path]:
 
     OBJ: the files of its ``mtllib`` lines, and the textures (``map_Kd`` …) that these name; PLY:
     what ``comment TextureFile`` names; glTF and GLB: the files of buffers and images; a film: the
-    GPX track of its name beside it; of other formats none. Absolute paths, each once, in the order of reference. Raises nothing: what is
-    missing or cannot be read is the reader's to judge.
+    GPX track of its name beside it; of other formats none. Absolute paths, each once, in the order
+    of reference. Raises nothing: what is missing or cannot be read is the reader's to judge.
 
     >>> companions("nobody.obj")
     []
