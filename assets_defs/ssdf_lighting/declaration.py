@@ -58,7 +58,7 @@ SSDF = System(
         Dimension(
             "scene",
             builtin=SCENES,
-            examples=("teapot",),
+            examples=("court",),
             default="teapot",
             suffixes=(".ply", ".obj", ".stl", ".glb", ".gltf"),
             check=_check_scene,
