@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -38,6 +38,7 @@ class DriveSettings(Settings):
     spacing: float = Field(3.0, gt=0, le=20, description="Built-in drive: metres between frames")
     width: int = Field(640, ge=160, le=4096, description="Built-in drive: pixels across, 8:5")
     view_angle: float = Field(75.0, ge=30, le=110, description="Built-in drive: degrees across")
+    cameras: Literal[1, 3] = Field(3, description="Built-in drive: cameras on the car")
     baseline: float = Field(0.8, gt=0, le=3, description="Built-in drive: metres between cameras")
     noise: float = Field(
         0.004, ge=0, le=0.2, description="Built-in drive: noise of the cameras, of white"
@@ -184,6 +185,7 @@ def _simulated(settings: DriveSettings, progress: Progress) -> Result:
         baseline=settings.baseline,
         seed=settings.seed,
         exposure_spread=settings.exposure_spread,
+        cameras=settings.cameras,
     )
     metres, kept = settings.frames * settings.spacing, held_out(settings.frames)
     streets = make_city(metres, settings.seed)
