@@ -101,13 +101,13 @@ def test_what_drives_along_has_no_depth() -> None:
     """A box that overtakes: it is larger in each photograph before, and comes from behind."""
     still = [_alone(number) for number in range(7)]
     frames = [one._replace(photographs=one.photographs.copy()) for one in still]
-    lens, depth = frames[0].intrinsics[0], [7.0 + 1.3 * number for number in range(7)]
+    lens, depth = frames[0].intrinsics[0], [5.0 + 1.3 * number for number in range(7)]
     texture = np.random.default_rng(5).integers(0, 255, (40, 60, 3), np.uint8)
     boxes = []
     for frame, away in zip(frames, depth, strict=True):
         focal, middle = lens[0, 0], lens[:2, 2]
         wide, high = int(1.8 * focal / away), int(1.4 * focal / away)
-        left, top = (int(middle[0] - 2.6 * focal / away), int(middle[1] + 0.5 * focal / away))
+        left, top = (int(middle[0] - 3.4 * focal / away), int(middle[1] + 0.6 * focal / away))
         rows = np.arange(high) * 40 // high
         columns = np.arange(wide) * 60 // wide
         box = np.s_[top : top + high, left : left + wide]

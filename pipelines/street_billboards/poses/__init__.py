@@ -1,0 +1,1 @@
+"""Where a drive's photographs were taken: given, mended, adjusted, or found."""
