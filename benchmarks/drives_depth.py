@@ -211,7 +211,7 @@ def kitti_frames(folder: Path) -> DriveFrames:
 
 
 def real(folder: Path) -> dict[str, float]:
-    """Every tenth frame, held out: the street, pictures from depth alone, the nearest photograph."""
+    """Every tenth frame: the street, pictures from depth alone, the nearest photograph."""
     drive = kitti_frames(folder)
     held = np.setdiff1d(np.arange(len(drive.poses)), drive.taken)
     found = DriveDepth(drive, nearest=NEAREST, farthest=FARTHEST)

@@ -97,27 +97,31 @@ def right_world(
     too little that several of them share, and where no reading of the poses fits them.
     """
     check_rigid(poses)
-    order = _along_the_way(poses[:, 0, :3, 3])
-    notes = []
-    if not np.array_equal(order, np.arange(len(poses))):
-        notes.append(
-            "The frames' times are out of order: they are taken in the order of their way."
-        )
-    given = poses[order]
-    stars = find_stars(lambda frame: load(int(order[frame])), _windows(len(poses)))
+    order = along_the_way(poses[:, 0, :3, 3])
+    stars = find_stars(lambda frame: load(int(order[frame])), windows(len(poses)))
+    found = read_world(stars, poses[order], intrinsics, camera_height=camera_height)
+    if np.array_equal(order, np.arange(len(poses))):
+        return found
+    said = "The frames' times are out of order: they are taken in the order of their way."
+    return found._replace(order=order, notes=(said, *found.notes))
+
+
+def read_world(
+    stars: Sequence[Star], poses: FloatArray, intrinsics: FloatArray, *, camera_height: float
+) -> World:
+    """``right_world`` from what photographs share (``sight_stars.find_stars``)."""
     if sum(int(np.isfinite(star.seen[..., 0]).sum()) for star in stars) < _LEAST_SIGHTS:
         raise ValueError(
             "The photographs share too few features to compare the poses with; expected "
             "neighbouring frames to show the same things."
         )
-    read, said = _best_reading(stars, given, intrinsics)
+    read, notes = _best_reading(stars, poses, intrinsics)
     lens, more = _right_focal(stars, read, intrinsics)
     _check_confirmed(stars, read, lens)
-    notes += [*said, *more]
     road = find_road(stars, read, lens)
-    upright, said = _upright(read, road)
-    scaled, more = _in_metres(upright, road, camera_height)
-    return World(scaled, lens, order, (*notes, *said, *more))
+    upright, turned = _upright(read, road)
+    scaled, unit = _in_metres(upright, road, camera_height)
+    return World(scaled, lens, np.arange(len(poses)), (*notes, *more, *turned, *unit))
 
 
 def check_rigid(poses: FloatArray) -> None:
@@ -135,14 +139,14 @@ def check_rigid(poses: FloatArray) -> None:
         )
 
 
-def _windows(frames: int) -> list[range]:
+def windows(frames: int) -> list[range]:
     """Consecutive frames at places all along a drive."""
     length = min(_LENGTH, frames)
     starts = np.unique(np.linspace(0, frames - length, _WINDOWS).astype(int))
     return [range(start, start + length) for start in starts]
 
 
-def _along_the_way(places: FloatArray) -> NDArray[np.int64]:
+def along_the_way(places: FloatArray) -> NDArray[np.int64]:
     """The frames (f, 3) as given, or along the way where that is less than half as far."""
     count = len(places)
     apart = np.linalg.norm(places[:, None] - places[None], axis=-1)
