@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from assets_defs.system import Progress
-    from pipelines.street_billboards.capture.drive_depth import RigFrame
+    from pipelines.street_billboards.capture.drive_depth import DriveFrames, RigFrame
     from pipelines.street_billboards.capture.drive_points import DrivePoints, LoadedByFrame
     from pipelines.street_billboards.capture.point_fusion import RgbdViews
     from pipelines.street_billboards.textures.photographs import Photographs
@@ -157,6 +157,14 @@ def rig_frame_of(drive: xr.Dataset, frame: int) -> RigFrame:
     return RigFrame(
         drive["photographs"][frame].values, drive["intrinsics"].values, drive["poses"][frame].values
     )
+
+
+def frames_of(drive: xr.Dataset) -> DriveFrames:
+    """A `drive_frames` dataset's frames, loaded when they are asked for."""
+    from pipelines.street_billboards.capture.drive_depth import DriveFrames
+
+    taken = np.flatnonzero(~drive["held_out"].values)
+    return DriveFrames(lambda frame: rig_frame_of(drive, frame), drive["poses"].values, taken)
 
 
 def taken_cameras(drive: xr.Dataset) -> Cameras:

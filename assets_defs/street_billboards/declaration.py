@@ -29,18 +29,21 @@ def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
 
 
 def _check_agreement(drive: Drive, name: str) -> None:
-    """Whether three frames in the middle of a drive show one world. Raises ValueError."""
+    """Whether some frames in the middle of a drive show one world. Raises ValueError."""
     from pipelines.street_billboards.capture.drive_agreement import (
         LEAST_AGREEMENT,
+        frames_compared,
         neighbours_agreement,
     )
     from pipelines.street_billboards.capture.drive_depth import RigFrame
 
-    middle = min(max(len(drive.times) // 2, 1), len(drive.times) - 2)
+    instants, reach = len(drive.times), frames_compared(len(drive.cameras)) // 2
+    reach = min(reach, (instants - 1) // 2)
+    middle = min(max(instants // 2, reach), instants - 1 - reach)
     found = neighbours_agreement(
         [
             RigFrame(read_frame(drive, frame), drive.intrinsics, drive.poses[frame])
-            for frame in (middle - 1, middle, middle + 1)
+            for frame in range(middle - reach, middle + reach + 1)
         ]
     )
     if found < LEAST_AGREEMENT:

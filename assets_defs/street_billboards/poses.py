@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -31,6 +31,7 @@ class PoseSettings(Settings):
     spacing: float = Field(3.0, gt=0, le=20, description="Built-in drive: metres between frames")
     width: int = Field(640, ge=160, le=4096, description="Built-in drive: pixels across, 8:5")
     view_angle: float = Field(75.0, ge=30, le=110, description="Built-in drive: degrees across")
+    cameras: Literal[1, 3] = Field(3, description="Built-in drive: cameras on the car")
     baseline: float = Field(0.8, gt=0, le=3, description="Built-in drive: metres between cameras")
     exposure_spread: float = Field(
         0.12, ge=0, le=0.5, description="Built-in drive: how much exposures differ"
@@ -183,6 +184,7 @@ def _planned(settings: PoseSettings) -> Result:
         baseline=settings.baseline,
         seed=settings.seed,
         exposure_spread=settings.exposure_spread,
+        cameras=settings.cameras,
     )
     dataset = poses_dataset(drive.poses, drive.intrinsics, size)
     metres = settings.frames * settings.spacing

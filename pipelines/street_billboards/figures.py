@@ -17,6 +17,8 @@ RAW_BYTES = 98_304
 """Of a billboard: 32 views of 32 x 32 pixels of 3 bytes."""
 _FARTHEST = 20.0
 """Metres, up to which depth is judged."""
+_JUDGED = 25.0
+"""Metres, up to which the depth of a photograph is judged where it is known."""
 _TOLERANCE = 0.05
 """Of a depth: what is off by less is right."""
 
@@ -72,6 +74,33 @@ def depth_error(depth: NDArray[np.floating], truth: NDArray[np.floating]) -> flo
     with np.errstate(invalid="ignore"):
         right = np.abs(depth - truth) <= _TOLERANCE * truth
     return float(1.0 - right[asked].mean())
+
+
+def known_share(depth: NDArray[np.floating], truth: NDArray[np.floating]) -> float:
+    """Share of the pixels (y, x) up to 25 m away whose depth is known, right or wrong."""
+    return float(np.isfinite(depth[truth < _JUDGED]).mean())
+
+
+def bad_depth_share(depth: NDArray[np.floating], truth: NDArray[np.floating]) -> float:
+    """Share of the depths known that are off by more than 5 %: up to 25 m, by either of the two.
+
+    >>> bad_depth_share(np.array([10.0, 20, np.nan, 9, 90]), np.array([10.2, 30, 5, 40, 80]))
+    0.6666666666666666
+    """
+    asked = np.isfinite(depth) & ((truth < _JUDGED) | (depth < _JUDGED))
+    right = np.abs(depth[asked] - truth[asked]) <= _TOLERANCE * truth[asked]
+    return float(1.0 - right.mean())
+
+
+def deviation_honest(
+    depth: NDArray[np.floating], deviation: NDArray[np.floating], truth: NDArray[np.floating]
+) -> float:
+    """Share of the depths known (as for ``bad_depth_share``) that are off by < 2 deviations.
+
+    0.954 of errors that are normally distributed, and of whatever else is less.
+    """
+    asked = np.isfinite(depth) & ((truth < _JUDGED) | (depth < _JUDGED))
+    return float((np.abs(depth - truth)[asked] < 2 * deviation[asked]).mean())
 
 
 def stray_share(

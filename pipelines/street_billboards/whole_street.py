@@ -9,10 +9,17 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import Cameras, unproject_depth
 from pipelines.street_billboards.billboards import fit_billboards
-from pipelines.street_billboards.capture import stereo
-from pipelines.street_billboards.capture.drive_depth import RigFrame, open_to_sky, sky_views
+from pipelines.street_billboards.capture.drive_depth import (
+    DriveDepth,
+    DriveFrames,
+    RigFrame,
+    open_to_sky,
+    sky_views,
+)
 from pipelines.street_billboards.capture.drive_points import (
+    Fusion,
     LoadedByFrame,
+    company_of,
     drive_gains,
     drive_points,
 )
@@ -39,19 +46,20 @@ def street_of_frames(
     farthest: float = 40.0,
     error: float = 4.4,
 ) -> StreetModel:
-    """All steps on frames of one rig: depth, points, billboards, textures, pages.
+    """All steps on frames of one rig or camera: depth, points, billboards, textures, pages.
 
     voxel: metres, side of an octree's leaf, which holds ``least_points`` at least; nearest,
     farthest: metres, between which depth is looked for; error: of the textures, in codes. Of a
     single frame every pixel of known depth becomes a point; of several those that they confirm.
-    Raises ValueError where there are none.
+    Raises ValueError where there are none, and for a single frame of one camera.
     """
     views, sky = _with_depth(frames, nearest, farthest)
     _, height, width = views.depth.shape
     cameras = len(frames[0].poses)
     drive = LoadedByFrame(len(frames), lambda taken: _some(views, taken, cameras))
     alone = len(frames) == 1
-    positions = _every_point(views) if alone else drive_points(drive).points.positions
+    fusion = Fusion(company=company_of(cameras))
+    positions = _every_point(views) if alone else drive_points(drive, fusion).points.positions
     leaves = octree_leaves(positions, voxel, least_points)
     billboards = fit_billboards(
         leaves, positions, Cameras(views.intrinsics, views.poses, width, height)
@@ -75,9 +83,12 @@ def _with_depth(
     frames: Sequence[RigFrame], nearest: float, farthest: float
 ) -> tuple[RgbdViews, NDArray[np.float32]]:
     """All photographs with their depths, frame by frame, and the sky behind them."""
+    poses = np.stack([frame.poses for frame in frames])
+    drive = DriveFrames(frames.__getitem__, poses, np.arange(len(frames)))
+    found = DriveDepth(drive, nearest=nearest, farthest=farthest)
     views, skies = [], list[SkyView]()
-    for frame in frames:
-        maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
+    for number, frame in enumerate(frames):
+        maps = found.maps(number)
         skies += sky_views(frame, maps)
         views.append(RgbdViews(maps.depth, maps.deviation, *frame))
     joined = RgbdViews._make(

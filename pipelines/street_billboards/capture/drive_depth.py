@@ -1,19 +1,42 @@
-"""Depth maps of a whole drive, frame by frame, before the sky that is behind all of them."""
+"""Depth maps of a whole drive, frame by frame, before the sky that is behind all of them.
+
+Of one camera by ``plane_sweep`` along the road: what the frames beside it do not confirm is
+unknown, so what moves on its own has no depth. Of a rig by ``stereo`` of its neighbours.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from concurrent.futures import Future
+from threading import Lock
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture import stereo
+from pipelines.street_billboards.capture import plane_sweep, stereo
+from pipelines.street_billboards.capture.multi_view_consistency import (
+    DepthView,
+    OtherDepthViews,
+    confirmed_depth,
+)
 from pipelines.street_billboards.capture.sky import SkyView, sky_map, sky_pixels
 from pipelines.street_billboards.capture.stereo import DepthMaps
 
+FloatArray = NDArray[np.float64]
+
+Made = TypeVar("Made")
+
 _SKY_FRAMES = 6
 """Frames that the sky is put together from."""
+_BESIDE = 3
+"""Frames before and after one that it is compared with; as many in all at a drive's ends."""
+_SHORTEST = 80
+"""Steps from one of them to the next that reach as far as depth does, at most."""
+_CONFIRMED = 2
+"""Frames that must have the same depth."""
+_KEPT = 4 * _BESIDE + 2
+"""Photographs' own depths that are kept: more than one frame and its neighbours ask for."""
 
 
 class RigFrame(NamedTuple):
@@ -21,36 +44,153 @@ class RigFrame(NamedTuple):
 
     photographs: NDArray[np.uint8]
     """(c, y, x, 3), sRGB."""
-    intrinsics: NDArray[np.float64]
+    intrinsics: FloatArray
     """(c, 3, 3), pixels."""
-    poses: NDArray[np.float64]
+    poses: FloatArray
     """(c, 4, 4), from the cameras' axes to the world's."""
 
 
-def drive_sky(
-    load: Callable[[int], RigFrame],
-    frames: Sequence[int] | NDArray[np.integer],
-    *,
-    nearest: float,
-    farthest: float,
-) -> NDArray[np.float32]:
-    """The sky (``sky.sky_map``) of half a dozen of these frames, which ``load`` gives by number.
+class DriveFrames(NamedTuple):
+    """The frames of a drive, loaded when they are asked for."""
 
-    nearest, farthest: as for ``stereo.depth_maps``.
+    load: Callable[[int], RigFrame]
+    poses: FloatArray
+    """(f, c, 4, 4), of all frames."""
+    taken: NDArray[np.integer]
+    """(t,), rising: frames that depth may be found from; others are held out."""
+
+
+class DriveDepth:
+    """Depth of a drive's frames, each found when it is asked for; what is kept meanwhile is little.
+
+    nearest, farthest: metres between which depth is looked for. Several threads may ask at once.
+
+    >>> frames = DriveFrames(load, poses, np.flatnonzero(~held_out))  # doctest: +SKIP
+    >>> maps = DriveDepth(frames, nearest=2.0, farthest=40.0).before_sky(12)  # doctest: +SKIP
     """
-    views: list[SkyView] = []
-    for frame in map(load, frames[:: max(len(frames) // _SKY_FRAMES, 1)]):
-        views += sky_views(frame, stereo.depth_maps(*frame, nearest=nearest, farthest=farthest))
-    return sky_map(views)
+
+    def __init__(self, frames: DriveFrames, *, nearest: float, farthest: float) -> None:
+        self._frames = frames
+        self._nearest, self._farthest = nearest, farthest
+        self._loaded = _Kept(frames.load)
+        self._swept = _Kept(self._sweep)
+
+    def maps(self, frame: int) -> DepthMaps:
+        """Depth of one frame's c cameras, held out or not; nan where unknown, the sky too.
+
+        Raises ValueError as ``stereo.depth_maps`` does, and for a frame that has no others.
+        """
+        if self._frames.poses.shape[1] > 1:
+            shown = self._loaded(frame)
+            return stereo.depth_maps(*shown, nearest=self._nearest, farthest=self._farthest)
+        return self._confirmed(frame)
+
+    def before_sky(self, frame: int) -> DepthMaps:
+        """The same, inf where the pixels show the sky."""
+        maps = self.maps(frame)
+        views = sky_views(self._loaded(frame), maps)
+        return DepthMaps(open_to_sky(views), maps.deviation)
+
+    def sky(self) -> NDArray[np.float32]:
+        """The sky (``sky.sky_map``) of half a dozen of the frames taken."""
+        taken = self._frames.taken
+        views: list[SkyView] = []
+        for frame in map(int, taken[:: max(len(taken) // _SKY_FRAMES, 1)]):
+            views += sky_views(self._loaded(frame), self.maps(frame))
+        return sky_map(views)
+
+    def _sweep(self, frame: int) -> DepthMaps:
+        """Of the one camera, as its photographs along the road have it."""
+        found = plane_sweep.sweep_depth(
+            _photograph(self._loaded(frame)),
+            [_photograph(self._loaded(one)) for one in self._beside(frame)],
+            nearest=self._nearest,
+            farthest=self._farthest,
+        )
+        return DepthMaps(found.depth[None], found.deviation[None])
+
+    def _confirmed(self, frame: int) -> DepthMaps:
+        """What the frames beside it have, too."""
+        own, others = self._swept(frame), self._beside(frame)
+        maps = list(map(self._swept, others))
+        poses, lens = self._frames.poses[:, 0], _lens(self._loaded(frame))
+        view = DepthView(own.depth[0], own.deviation[0], lens, np.ascontiguousarray(poses[frame]))
+        asked = OtherDepthViews(
+            np.concatenate([one.depth for one in maps]),
+            np.concatenate([one.deviation for one in maps]),
+            np.stack([_lens(self._loaded(one)) for one in others]),
+            np.asarray(np.linalg.inv(poses[others]), np.float64),
+        )
+        depth, deviation = confirmed_depth(view, asked, min(_CONFIRMED, len(others)))
+        return DepthMaps(depth[None], deviation[None])
+
+    def _beside(self, frame: int) -> list[int]:
+        places = self._frames.poses[:, 0, :3, 3]
+        return frames_beside(places, self._frames.taken, frame, self._farthest / _SHORTEST)
 
 
-def depth_before_sky(frame: RigFrame, *, nearest: float, farthest: float) -> DepthMaps:
-    """Depth maps of a frame by stereo, inf where the pixels show the sky.
+class _Kept(Generic[Made]):
+    """What a function makes of a frame, made once; the last few are kept."""
 
-    nearest, farthest: metres; raises ValueError as ``stereo.depth_maps`` does.
+    def __init__(self, make: Callable[[int], Made]) -> None:
+        self._make, self._lock = make, Lock()
+        self._kept: dict[int, Future[Made]] = {}
+
+    def __call__(self, frame: int) -> Made:
+        with self._lock:
+            known = self._kept.pop(frame, None)
+            found = Future[Made]() if known is None else known
+            self._kept[frame] = found
+            if len(self._kept) > _KEPT:
+                del self._kept[next(iter(self._kept))]
+        if known is None:
+            try:
+                found.set_result(self._make(frame))
+            except BaseException as error:
+                found.set_exception(error)
+                raise
+        return found.result()
+
+
+def frames_beside(
+    places: FloatArray, taken: NDArray[np.integer], frame: int, least: float
+) -> list[int]:
+    """Which of the frames taken one is compared with: three before and three after, rising.
+
+    places (f, 3) of all frames; least: metres from each to the next, which a car that stands still
+    or creeps does not come. At either end of the drive there are more of the other side. Raises
+    ValueError where there is none.
+
+    >>> places = np.array([[0.0, 0, 0], [1, 0, 0], [1.01, 0, 0], [2, 0, 0]])
+    >>> frames_beside(places, np.arange(4), 1, 0.5)
+    [0, 3]
     """
-    maps = stereo.depth_maps(*frame, nearest=nearest, farthest=farthest)
-    return DepthMaps(open_to_sky(sky_views(frame, maps)), maps.deviation)
+
+    def chosen(side: NDArray[np.integer]) -> list[int]:
+        found, last = list[int](), frame
+        for one in map(int, side):
+            if np.linalg.norm(places[one] - places[last]) >= least and len(found) < 2 * _BESIDE:
+                found.append(one)
+                last = one
+        return found
+
+    before, after = chosen(taken[taken < frame][::-1]), chosen(taken[taken > frame])
+    more = max(_BESIDE, 2 * _BESIDE - min(len(before), len(after)))
+    found = sorted(before[:more] + after[:more])
+    if not found:
+        raise ValueError(
+            f"frame {frame}: no other frame was taken {least:g} m from it; expected a drive."
+        )
+    return found
+
+
+def _photograph(frame: RigFrame) -> plane_sweep.Photograph:
+    return plane_sweep.Photograph(frame.photographs[0], frame.intrinsics[0], frame.poses[0])
+
+
+def _lens(frame: RigFrame) -> FloatArray:
+    k = frame.intrinsics[0]
+    return np.array([k[0, 0], k[1, 1], k[0, 2], k[1, 2]], np.float64)
 
 
 def open_to_sky(views: Sequence[SkyView]) -> NDArray[np.float32]:

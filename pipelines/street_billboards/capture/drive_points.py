@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -37,6 +38,17 @@ class Fusion(NamedTuple):
     """Pixels from one to the next."""
     cell: float = 0.05
     """Metres; points of one cell become one."""
+    company: int = 10
+    """Points around one without which it is an outlier."""
+
+
+def company_of(cameras: int) -> int:
+    """Points that a point has around it: fewer cameras leave fewer of them on every surface.
+
+    >>> company_of(3), company_of(1)
+    (10, 4)
+    """
+    return math.ceil(10 * min(cameras, 3) / 3)
 
 
 class DrivePoints(NamedTuple):
@@ -75,7 +87,7 @@ def drive_points(
                 step=fusion.step,
             )
 
-    points = point_fusion.fuse_points(parts(), fusion.cell)
+    points = point_fusion.fuse_points(parts(), fusion.cell, fusion.company)
     if len(points.positions) == 0:
         raise ValueError(
             "street_points: no point is confirmed by other frames; expected consistent intrinsics "

@@ -35,8 +35,8 @@ _TILE = 25.0
 """Metres, the side of what is cleaned at a time."""
 _PENDING = 400_000
 """Points that a tile keeps before they are merged."""
-_REACH, _COMPANY = 3.0, 10
-"""Cells around a point, and points that have to be there; a pole 10 cm thick has about 15."""
+_REACH = 3.0
+"""Cells around a point in which others have to be."""
 
 
 class Points(NamedTuple):
@@ -168,11 +168,12 @@ def _joined(parts: list[Points]) -> Points:
 # ---- a drive ---------------------------------------------------------------------------------
 
 
-def fuse_points(parts: Iterable[Points], cell: float = 0.05) -> Points:
+def fuse_points(parts: Iterable[Points], cell: float = 0.05, company: int = 10) -> Points:
     """The union of many frames' points, one for each cell of ``cell`` metres, without outliers.
 
-    Positions, colours and normals are means by weight. Those that fewer than ten others accompany
-    within three cells are left out (Open3D). What is kept meanwhile grows with the surface's cells,
+    Positions, colours and normals are means by weight. Those that fewer than ``company`` others
+    accompany within three cells are left out (Open3D); of three cameras, a pole 10 cm thick has
+    about 15 points there. What is kept meanwhile grows with the surface's cells,
     not with frames; outliers are looked for in tiles of 25 m. Ordered by tile.
     """
     tiles: dict[tuple[int, int], list[Sums]] = defaultdict(list)
@@ -183,7 +184,7 @@ def fuse_points(parts: Iterable[Points], cell: float = 0.05) -> Points:
             if sum(map(len, tiles[tile][1:])) > _PENDING:
                 tiles[tile] = [_cells(np.concatenate(tiles[tile]), cell)]
     merged = {tile: _cells(np.concatenate(rows), cell) for tile, rows in tiles.items()}
-    return _joined([_cleaned(merged, tile, cell) for tile in sorted(merged)])
+    return _joined([_cleaned(merged, tile, cell, company) for tile in sorted(merged)])
 
 
 def _rows(points: Points) -> Sums:
@@ -230,7 +231,9 @@ def _by_tile(rows: Sums) -> list[tuple[tuple[int, int], Sums]]:
     ]
 
 
-def _cleaned(tiles: dict[tuple[int, int], Sums], tile: tuple[int, int], cell: float) -> Points:
+def _cleaned(
+    tiles: dict[tuple[int, int], Sums], tile: tuple[int, int], cell: float, company: int
+) -> Points:
     """A tile's cells without those that stand alone, judged with a margin of its neighbours."""
     import open3d as o3d  # takes seconds, and depth maps do without
 
@@ -247,7 +250,7 @@ def _cleaned(tiles: dict[tuple[int, int], Sums], tile: tuple[int, int], cell: fl
                 inside = ((places[:, :2] >= low) & (places[:, :2] <= high)).all(axis=1)
                 around.append(places[inside])
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.concatenate(around)))
-    _, rest = cloud.remove_radius_outlier(nb_points=_COMPANY, radius=radius)
+    _, rest = cloud.remove_radius_outlier(nb_points=company, radius=radius)
     kept = np.asarray(rest, dtype=np.int64)
     own = own[np.sort(kept[kept < len(own)])]
     normals = own[:, 6:9]

@@ -1,11 +1,12 @@
 """The built-in drive: where the cameras are, how they expose, and their noise.
 
-A car drives along the right lane with three cameras in a row across it, all looking forward.
+A car drives along the right lane with three cameras in a row across it, all looking forward, or
+with the middle one of them alone.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +50,16 @@ def plan_drive(
     seed: int = 0,
     exposure_spread: float = 0.12,
     bend: Bend = STRAIGHT,
+    cameras: Literal[1, 3] = 3,
 ) -> SimulatedDrive:
     """A drive from x = 0 towards +x: a frame every ``spacing`` metres of the road.
 
     bend: of the road, as of the city that is driven through.
     view_angle: horizontal, degrees. Cameras are, from 0 to 2, ``baseline`` metres to the left of
-    the car's middle, in it, and to its right, at ``camera_height`` metres. A camera's gain is a
-    constant of a few percent times a slow drift, whose standard deviation over a long drive is
-    ``exposure_spread``. Raises ValueError for sizes that are not positive.
+    the car's middle, in it, and to its right, at ``camera_height`` metres; a single one is the
+    second of these. A camera's gain is a constant of a few percent times a slow drift, whose
+    standard deviation over a long drive is ``exposure_spread``. Raises ValueError for sizes that
+    are not positive.
 
     >>> drive = plan_drive(frames=12, spacing=2.0, width=64, height=40)
     >>> drive.poses.shape, drive.gains.shape
@@ -76,7 +79,8 @@ def plan_drive(
     car = np.stack([_pose(*row, camera_height) for row in zip(x, y, heading, strict=True)])
     if bend.angle:
         car = bent_poses(car, bend)
-    offsets = (baseline, 0.0, -baseline)
+    mounted = slice(None) if cameras == 3 else slice(1, 2)
+    offsets = (baseline, 0.0, -baseline)[mounted]
     poses = np.stack([[moved_left(pose, offset) for offset in offsets] for pose in car])
     focal = width / (2.0 * np.tan(np.radians(view_angle) / 2.0))
     camera = [[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]]
@@ -87,9 +91,9 @@ def plan_drive(
     )
     slow = np.exp(exposure_spread * drift / np.sqrt(0.625))
     return SimulatedDrive(
-        intrinsics=np.tile(np.array(camera, np.float64), (3, 1, 1)),
+        intrinsics=np.tile(np.array(camera, np.float64), (cameras, 1, 1)),
         poses=poses,
-        gains=slow[:, None] * own[None],
+        gains=slow[:, None] * own[None, mounted],
     )
 
 

@@ -1,0 +1,87 @@
+"""The road below a drive's cameras, as points that several photographs show have it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.street_billboards.poses.sight_stars import Star, sights
+
+FloatArray = NDArray[np.float64]
+
+_EXACT = 1.5
+"""Pixels within which a point's sights are."""
+_STEEP = 0.15
+"""Tangent below the horizon from which on a ray may meet the road nearby."""
+_ASIDE = 2.0
+"""Of a point's depth below the camera: how far aside it may be."""
+_TRIALS = 600
+_ON_PLANE = 0.04
+"""Of the cameras' height: points within it are on the road."""
+_LEAST_POINTS = 30
+_LEAST_SHARE = 0.25
+_TILTED = 0.9
+"""Cosine between the road's normal and the cameras' up, at least."""
+
+
+class Road(NamedTuple):
+    """A plane below the cameras."""
+
+    up: FloatArray
+    """(3,), its unit normal, in the world of the poses."""
+    height: float
+    """Of the cameras above it, median, in their unit."""
+
+
+def find_road(
+    stars: Sequence[Star], poses: FloatArray, intrinsics: FloatArray, seed: int = 0
+) -> Road | None:
+    """The plane of most points below the cameras; None where no plane holds a quarter of them.
+
+    poses (f, c, 4, 4), camera to world, any unit and any way up: what is below is told by the
+    cameras' own axes (y down). Each star's points are taken from its camera, so that a road that
+    climbs along the drive does not matter. RANSAC (Fischler and Bolles 1981), then least squares.
+    """
+    below, ups = [], []
+    for star in stars:
+        found = sights(star, poses, intrinsics)
+        frame, camera = star.view
+        exact = np.nanmedian(found.residual, axis=1) < _EXACT if len(star.pixels) else []
+        rays = np.concatenate([star.pixels, np.ones((len(star.pixels), 1))], axis=1)
+        rays = rays @ np.linalg.inv(intrinsics[camera]).T
+        low = (rays[:, 1] > _STEEP) & (np.abs(rays[:, 0]) < _ASIDE * rays[:, 1])
+        kept = np.asarray(exact, bool) & low & (found.inverse_depth > 0)
+        points = rays[kept] / found.inverse_depth[kept, None]
+        below.append(points @ poses[frame, camera, :3, :3].T)
+        ups.append(-poses[frame, camera, :3, 1])
+    points, up = np.concatenate(below), np.mean(ups, axis=0)
+    up /= np.linalg.norm(up)
+    if len(points) < _LEAST_POINTS:
+        return None
+    return _plane(points, up, np.random.default_rng(seed))
+
+
+def _plane(points: FloatArray, up: FloatArray, generator: np.random.Generator) -> Road | None:
+    best, inside = 0, np.zeros(len(points), bool)
+    for _ in range(_TRIALS):
+        one, two, three = points[generator.choice(len(points), 3, replace=False)]
+        normal = np.cross(two - one, three - one)
+        length = np.linalg.norm(normal)
+        if length == 0:
+            continue
+        normal /= length * np.sign(normal @ up or 1.0)
+        height = -float(normal @ one)
+        if normal @ up < _TILTED or height <= 0:
+            continue
+        near = np.abs(points @ normal + height) < _ON_PLANE * height
+        if near.sum() > best:
+            best, inside = int(near.sum()), near
+    if best < max(_LEAST_POINTS, _LEAST_SHARE * len(points)):
+        return None
+    middle = points[inside].mean(axis=0)
+    normal = np.linalg.svd(points[inside] - middle, full_matrices=False)[2][2]
+    normal *= np.sign(normal @ up)
+    return Road(normal, -float(normal @ middle))
