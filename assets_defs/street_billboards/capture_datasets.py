@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from pipelines.virtual.city.drive_photographs import DrivePhotographs
 
 _PIXELS = ("y", "x", "channel")
+_HIDDEN = 0.01
+"""Metres: the depth of pixels that are not used, in front of all that textures are taken of."""
 
 
 # ---- drives ----------------------------------------------------------------------------------
@@ -261,6 +263,10 @@ def photographs_of(
 
     views = frame_views(drive, depths, taken)
     fill_unknown_depth(views, points["positions"].values, farthest=farthest)
+    if "used" in drive:
+        views.depth[~_merged(drive["used"].isel(frame=depths["frame"].values[taken]).values)] = (
+            _HIDDEN
+        )
     return Photographs(
         views.photographs,
         views.depth,

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assets_defs.sources import Source
+from assets_defs.street_billboards.given_poses import check_agreement, world_of
 from assets_defs.system import Dimension, System
-from storage.readers.drives import Drive, read_drive, read_frame
+from storage.readers.drives import read_drive
 from storage.readers.films import SUFFIXES as FILM_SUFFIXES
 from storage.versions import Slot, VersionedStore
 
@@ -20,37 +21,18 @@ CITY = "city"
 
 
 def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
-    """Everything but the pixels; then a few frames, whether they show one world: once."""
-    if source.path is not None:
-        drive = read_drive(source.path)
-        is_first = "start" in settings  # those of `drive_poses`
-        if is_first and not np.isnan(drive.poses).any():
-            _check_agreement(drive, source.name)
-
-
-def _check_agreement(drive: Drive, name: str) -> None:
-    """Whether some frames in the middle of a drive show one world. Raises ValueError."""
-    from pipelines.street_billboards.capture.drive_agreement import (
-        LEAST_AGREEMENT,
-        frames_compared,
-        neighbours_agreement,
-    )
-    from pipelines.street_billboards.capture.drive_depth import RigFrame
-
-    instants, reach = len(drive.times), frames_compared(len(drive.cameras)) // 2
-    reach = min(reach, (instants - 1) // 2)
-    middle = min(max(instants // 2, reach), instants - 1 - reach)
-    found = neighbours_agreement(
-        [
-            RigFrame(read_frame(drive, frame), drive.intrinsics, drive.poses[frame])
-            for frame in range(middle - reach, middle + reach + 1)
-        ]
-    )
-    if found < LEAST_AGREEMENT:
-        raise ValueError(
-            f"{name}: of the points of time {drive.times[middle]:g} the frames beside it confirm "
-            f"{found:.0%}; expected {LEAST_AGREEMENT:.0%} at least: intrinsics or poses are wrong."
-        )
+    """Everything but the pixels; then some frames, whether they show one world: once."""
+    if source.path is None:
+        return
+    drive = read_drive(source.path)
+    is_first = "camera_height" in settings  # those of `drive_poses`
+    if not is_first or np.isnan(drive.poses).any():
+        return
+    try:
+        world = world_of(drive, np.arange(len(drive.times)), settings["camera_height"])
+    except ValueError as error:
+        raise ValueError(f"{source.name}: {error}") from error
+    check_agreement(drive, world, source.name)
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:

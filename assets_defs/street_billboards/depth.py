@@ -146,7 +146,10 @@ def depth_maps(settings: DepthSettings, progress: Progress, drive_frames: xr.Dat
     found = DriveDepth(frames, nearest=settings.nearest, farthest=settings.farthest)
 
     def maps_of(frame: int) -> NDArray[np.float32]:
-        return np.stack(found.before_sky(frame))
+        maps = np.stack(found.before_sky(frame))
+        if "used" in drive_frames:
+            maps[:, ~drive_frames["used"][frame].values] = np.nan
+        return maps
 
     shape = drive_frames["photographs"].shape[1:4]
     maps = stacked_by_frame(maps_of, frames.taken, ((2, *shape), np.float32), progress)

@@ -17,6 +17,7 @@ from assets_defs.street_billboards.capture_datasets import (
     stacked_by_frame,
 )
 from assets_defs.street_billboards.declaration import STREET
+from assets_defs.street_billboards.used_pixels import used_pixels
 from assets_defs.system import Pictures, Progress, Result
 from pipelines.street_billboards import figures
 from storage.readers.drives import Drive, read_drive, read_frame
@@ -107,29 +108,34 @@ def _taken_in(drive: Drive, poses: xr.Dataset) -> Result:
     from pipelines.street_billboards.capture.held_out import held_out
 
     lenses, size = poses["intrinsics"].values, (drive.width, drive.height)
-    distortion = poses["distortion"].values
+    distortion, instants = poses["distortion"].values, poses["instant"].values
 
     def taken(frame: int) -> NDArray[np.uint8]:
         return centre_photographs(read_frame(drive, frame), lenses, distortion)
 
-    shape = (len(drive.cameras), drive.height, drive.width, 3)
-    photographs = stacked_by_frame(taken, poses["instant"].values, (shape, np.uint8))
+    shape = (len(drive.cameras), drive.height, drive.width)
+    photographs = stacked_by_frame(taken, instants, ((*shape, 3), np.uint8))
     intrinsics = np.stack([centred_intrinsics(lens, *size) for lens in lenses])
     kept = held_out(poses.sizes["frame"])
     dataset = drive_dataset(photographs, intrinsics, poses, kept)
+    if (used := used_pixels(drive, poses)) is not None:
+        masks = stacked_by_frame(used, instants, (shape, np.bool_))
+        dataset = dataset.assign(used=(("frame", "camera", "y", "x"), masks))
     return dataset, {"photographs": kept.size * len(lenses)}
 
 
 def _simulated(settings: DriveSettings, progress: Progress, poses: xr.Dataset) -> Result:
     """The photographs of the built-in drive, and what is true in frames held out."""
     from pipelines.street_billboards.capture.held_out import held_out
+    from pipelines.virtual.city.bend import road_bend
     from pipelines.virtual.city.city import make_city
     from pipelines.virtual.city.drive_photographs import photograph_drive
     from pipelines.virtual.city.photographing import CityStage
     from storage.readers.street_photographs import street_photographs
 
     kept, seed = held_out(poses.sizes["frame"]), int(poses.attrs["seed"])
-    streets = make_city(float(poses.attrs["metres"]), seed)
+    metres = float(poses.attrs["metres"])
+    streets = make_city(metres, seed, road_bend(metres, float(poses.attrs["bend"])))
     progress(0.1)
     with CityStage(streets, street_photographs(), *map(int, poses["size"].values)) as stage:
         taken = photograph_drive(

@@ -13,9 +13,10 @@ from assets_defs.settings import Preset, Settings
 from assets_defs.sources import Source
 from assets_defs.street_billboards.capture_datasets import PosePoints, poses_dataset
 from assets_defs.street_billboards.declaration import STREET
+from assets_defs.street_billboards.given_poses import adjusted, world_of
 from assets_defs.system import NOTES, Pictures, Progress, Result
 from pipelines.street_billboards import figures
-from storage.readers.drives import Drive, frame_notes, read_drive, read_frame
+from storage.readers.drives import Drive, frame_notes, read_drive
 from storage.schemas import street_billboards as schemas
 from storage.stored_version import StoredVersion
 
@@ -33,6 +34,9 @@ class PoseSettings(Settings):
     view_angle: float = Field(75.0, ge=30, le=110, description="Built-in drive: degrees across")
     cameras: Literal[1, 3] = Field(3, description="Built-in drive: cameras on the car")
     baseline: float = Field(0.8, gt=0, le=3, description="Built-in drive: metres between cameras")
+    bend: float = Field(
+        0.0, ge=-45, le=45, description="Built-in drive: degrees by which the road turns left"
+    )
     exposure_spread: float = Field(
         0.12, ge=0, le=0.5, description="Built-in drive: how much exposures differ"
     )
@@ -151,30 +155,26 @@ def _given(
     """The poses that a drive's files have, adjusted if asked for."""
     notes = [*drive.notes]
     notes += [f"As of all its photographs: {note}" for note in frame_notes(drive, int(chosen[0]))]
+    world = world_of(drive, chosen, settings.camera_height)
+    poses, instants, more = world.poses.copy(), chosen[world.order], list(world.notes)
+    if settings.adjust:
+        poses, said = adjusted(drive, world, instants, progress)
+        more += said
     # Graphics are drawn in single precision: far from its zero, a map's grid would have no digits.
-    poses = drive.poses[chosen]
     origin = np.round(poses[0, 0, :3, 3])
     poses[..., :3, 3] -= origin
-    if settings.adjust:
-        from pipelines.street_billboards.poses.adjusted_poses import adjust_poses
-
-        frames = (list(read_frame(drive, int(frame))) for frame in chosen)
-
-        def told(done: float) -> None:
-            progress(done / len(chosen))
-
-        adjusted = adjust_poses(frames, poses, drive.intrinsics, progress=told)
-        poses, notes = adjusted.poses, [*notes, *adjusted.notes]
     size = drive.width, drive.height
-    dataset = poses_dataset(poses, drive.intrinsics, size, instant=chosen, origin=origin)
+    dataset = poses_dataset(poses, world.intrinsics, size, instant=instants, origin=origin)
     shown = {"cameras": ", ".join(drive.cameras), "frames": len(chosen)}
-    return dataset, {**shown, NOTES: notes}
+    return dataset, {**shown, NOTES: [*notes, *more]}
 
 
 def _planned(settings: PoseSettings) -> Result:
     """The way through the city, and the exposures of its photographs."""
+    from pipelines.virtual.city.bend import road_bend
     from pipelines.virtual.city.drive import plan_drive
 
+    metres = settings.frames * settings.spacing
     size = settings.width, settings.width * 5 // 8
     drive = plan_drive(
         settings.frames,
@@ -185,8 +185,9 @@ def _planned(settings: PoseSettings) -> Result:
         seed=settings.seed,
         exposure_spread=settings.exposure_spread,
         cameras=settings.cameras,
+        bend=road_bend(metres, settings.bend),
     )
     dataset = poses_dataset(drive.poses, drive.intrinsics, size)
-    metres = settings.frames * settings.spacing
     exposed = dataset.assign(exposure=(("frame", "camera"), drive.gains))
-    return exposed.assign_attrs(metres=metres, seed=settings.seed), {"metres": metres}
+    planned = {"metres": metres, "seed": settings.seed, "bend": settings.bend}
+    return exposed.assign_attrs(planned), {"metres": metres}

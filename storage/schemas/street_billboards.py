@@ -76,6 +76,13 @@ DRIVE_FRAMES = Schema(
         "held_out": Variable(
             ("frame",), "bool", "1", "Used to judge pictures and for nothing else"
         ),
+        "used": Variable(
+            ("frame", "camera", "y", "x"),
+            "bool",
+            "1",
+            "Where a photograph shows the world; all of it where this is missing",
+            optional=True,
+        ),
         "truth_depth": Variable(
             ("held", "y", "x"),
             "float32",

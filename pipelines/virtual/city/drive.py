@@ -80,7 +80,7 @@ def plan_drive(
     if bend.angle:
         car = bent_poses(car, bend)
     mounted = slice(None) if cameras == 3 else slice(1, 2)
-    offsets = (baseline, 0.0, -baseline)[mounted]
+    offsets = np.array([baseline, 0.0, -baseline])[mounted]
     poses = np.stack([[moved_left(pose, offset) for offset in offsets] for pose in car])
     focal = width / (2.0 * np.tan(np.radians(view_angle) / 2.0))
     camera = [[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]]
