@@ -140,7 +140,10 @@ def film_frames(film: Film, numbers: list[int]) -> Iterator[tuple[int, NDArray[n
 def _opened(file: Path) -> Any:
     import av
 
-    av.logging.set_level(av.logging.PANIC)
+    # PyAV's own way of silence asks for Python's lock while it holds its own: threads that decode
+    # side by side wait for each other for ever (PyAV's issue 751). FFmpeg's does not.
+    av.logging.restore_default_callback()
+    av.logging.set_libav_level(av.logging.PANIC)
     try:
         return av.open(str(file), metadata_errors="replace")
     except av.error.FFmpegError as error:
