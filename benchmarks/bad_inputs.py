@@ -154,6 +154,7 @@ def written(case: Case, folder: Path) -> Path:
     folder.mkdir()
     for name, content in case.files.items():
         file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
         if isinstance(content, bytes):
             file.write_bytes(content)
         elif content == "folder":

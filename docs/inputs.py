@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from storage.readers.drives.formats import FORMATS
+
 PAGE = Path(__file__).parent / "inputs.md"
 RESULTS = Path("benchmarks") / "results" / "captures.json"
 
@@ -59,7 +61,21 @@ def input_page(results: dict[str, Any]) -> str:
             if row["group"] == group:
                 cells = (f"`{row['file']}`", row["kind"], row["ending"], row["what"])
                 lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_drives()]) + "\n"
+
+
+def _drives() -> list[str]:
+    """The formats of drives, the most specific first."""
+    return [
+        "",
+        "## Drives",
+        "",
+        "A folder; its format is found from the files in it, the first of these that there is.",
+        "",
+        "| format | known by | what is read |",
+        "|---|---|---|",
+        *(f"| {known.name} | `{known.known_by}` | {known.sentence} |" for known in FORMATS),
+    ]
 
 
 if __name__ == "__main__":

@@ -138,7 +138,7 @@ def _imu_poses(drive: Path, numbers: list[int]) -> dict[int, NDArray[np.float64]
             table = Table(file, _EXPECTED)
             words = table.lines[0] if table.lines else ""
             packets[number] = table.numbers(0, words, _OXTS)
-            _check_latitude(file, packets[number][0])
+            _check_packet(file, packets[number])
     if not packets:
         return {}
     first = next(iter(packets.values()))
@@ -150,9 +150,14 @@ def _imu_poses(drive: Path, numbers: list[int]) -> dict[int, NDArray[np.float64]
     }
 
 
-def _check_latitude(file: Path, degrees: float) -> None:
-    if not abs(degrees) < 89:
-        raise BadInput(file, "latitude", f"{degrees:g} degrees", "from -89 to 89 degrees")
+def _check_packet(file: Path, packet: NDArray[np.float64]) -> None:
+    for what, value, most in (
+        ("latitude", packet[0], 89.0),
+        ("longitude", packet[1], 360.0),
+        ("altitude", packet[2], 1e5),
+    ):
+        if not abs(value) <= most:
+            raise BadInput(file, what, f"{value:g}", f"from {-most:g} to {most:g}")
 
 
 def _mercator(packet: NDArray[np.float64], scale: float) -> NDArray[np.float64]:

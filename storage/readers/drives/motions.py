@@ -56,7 +56,8 @@ def quaternion_rotation(
     file: Path, field: str, quaternion: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(3, 3) of a quaternion w, x, y, z, made a unit one; raises BadInput where it is none."""
-    length = float(np.linalg.norm(quaternion)) if np.isfinite(quaternion).all() else 0.0
+    largest = float(np.abs(quaternion).max())
+    length = float(np.linalg.norm(quaternion)) if largest < 2 else largest  # no squares of 1e200
     if not 0.5 < length < 2:
         found = f"a quaternion of length {length:.3g}"
         raise BadInput(file, field, found, "a unit quaternion w, x, y, z")

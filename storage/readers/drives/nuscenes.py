@@ -131,7 +131,7 @@ def _cameras(
     file = tables / "calibrated_sensor.json"
     found = {}
     for row in _rows(tables, "calibrated_sensor"):
-        if row.get("sensor_token") not in channels:
+        if _text(tables, "calibrated_sensor", row, "sensor_token") not in channels:
             continue
         token = _text(tables, "calibrated_sensor", row, "token")
         field = f"calibration {shortened(token, 40)}"
@@ -175,7 +175,7 @@ def _pictures_there(
 def _camera_rows(tables: Path, cameras: set[str]) -> Iterator[_Row]:
     """The rows of `sample_data` that are pictures."""
     for row in json_rows(tables / "sample_data.json"):
-        if row.get("calibrated_sensor_token") in cameras:
+        if _text(tables, "sample_data", row, "calibrated_sensor_token") in cameras:
             for key in ("filename", "ego_pose_token", "sample_token"):
                 _text(tables, "sample_data", row, key)
             yield row
