@@ -140,7 +140,6 @@ def film_frames(film: Film, numbers: list[int]) -> Iterator[tuple[int, NDArray[n
 def _opened(file: Path) -> Any:
     import av
 
-    av.logging.set_level(av.logging.PANIC)
     try:
         return av.open(str(file), metadata_errors="replace")
     except av.error.FFmpegError as error:
