@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-MOST = 3000
+MOST = 2000
 """Features of a picture."""
 _CELLS = (12, 4)
 """A picture's parts across and down, each of which gets its share of the features."""

@@ -98,7 +98,7 @@ def find_poses(
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "matches.db"
             write_matches(file, camera, frames)
-            mapped = map_frames(file, counted.count - start, fixed_focal=camera.is_known)
+            mapped = map_frames(file, counted.count - start, camera)
         if mapped is not None and len(mapped.frames) >= 3:
             pieces.append(_piece(mapped, camera, start, counted))
     return _whole(pieces, camera, counted.count)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.poses.bundle import Bundle, Sightings
+from pipelines.street_billboards.poses.bundle import Bundle, Sightings, residuals
 from pipelines.street_billboards.poses.features import Features, match_features
 
 FloatArray = NDArray[np.float64]
@@ -25,10 +25,13 @@ NEIGHBOURS = 8
 FEWEST_MATCHES = 15
 _LEAST_ANGLE = 0.7
 """Degrees under which a point is seen at least."""
-_FIRST_ANGLES = (4.0, 2.0, 1.0)
-"""Degrees of the first pair's points, tried in this order."""
+_ATTEMPTS = ((4.0, 1.0), (8.0, 0.8), (2.0, 1.25), (12.0, 1.0), (1.0, 0.9))
+"""Degrees under which the first pair's points are seen at least, and a factor of the guessed focal
+length."""
 _ENOUGH = 0.95
-"""Share of frames with a pose that ends the trying."""
+"""Share of frames with a pose, without which two attempts do not agree."""
+_AGREE = 0.03
+"""By how much sightings that fit may differ where two attempts found the same."""
 
 
 class Pinhole(NamedTuple):
@@ -85,26 +88,41 @@ def write_matches(file: Path, camera: Pinhole, frames: Iterable[Features]) -> No
         pycolmap.geometric_verification(file, two_view_geometry_options=verifying)
 
 
-def map_frames(file: Path, count: int, *, fixed_focal: bool) -> Mapped | None:
+def map_frames(file: Path, count: int, camera: Pinhole) -> Mapped | None:
     """Poses and points from a database of ``count`` frames; None where no pair starts it.
 
-    First pairs of ever smaller angles are tried until 95 % of the frames have a pose; the best
-    attempt is taken.
+    A first pair may be understood wrongly (a street's walls are planes, and its motion is forward),
+    and all that follows stands on it. So it is tried from other pairs and focal lengths until two
+    attempts agree; the one with most sightings within a pixel is taken.
     """
     import pycolmap
 
-    best: Any = None
-    for angle in _FIRST_ANGLES:
+    best: Mapped | None = None
+    most = 0
+    for angle, factor in _ATTEMPTS:
+        if not camera.is_known:
+            _guess(file, factor * camera.focal)
         with _quiet():
-            found = pycolmap.incremental_mapping(
-                file, file.parent, file.parent, _options(angle, fixed_focal=fixed_focal)
-            )
-        for model in found.values():
-            if best is None or model.num_reg_images() > best.num_reg_images():
-                best = model
-        if best is not None and best.num_reg_images() >= _ENOUGH * count:
-            break
-    return None if best is None else _mapped(best)
+            options = _options(angle, fixed_focal=camera.is_known)
+            models = pycolmap.incremental_mapping(file, file.parent, file.parent, options)
+        for model in models.values():
+            found = _mapped(model)
+            good = int((np.linalg.norm(residuals(found.bundle, found.seen)[0], axis=1) < 1).sum())
+            agree = abs(good - most) < _AGREE * most and len(found.frames) >= _ENOUGH * count
+            if good > most:
+                best, most = found, good
+            if agree:
+                return best
+    return best
+
+
+def _guess(file: Path, focal: float) -> None:
+    import pycolmap
+
+    with pycolmap.Database.open(file) as database:
+        (lens,) = database.read_all_cameras()
+        lens.params = np.array([focal, *lens.params[1:]])
+        database.update_camera(lens)
 
 
 def _options(first_angle: float, *, fixed_focal: bool) -> Any:
@@ -138,7 +156,8 @@ def _camera(camera: Pinhole) -> Any:
         height=camera.height,
         params=[camera.focal, *middle],
     )
-    made.has_prior_focal_length = camera.is_known
+    # Also a guess: matches are then verified both with it and without.
+    made.has_prior_focal_length = True
     return made
 
 

@@ -88,8 +88,8 @@ def by_track(poses: FloatArray, up: FloatArray, track: FloatArray) -> tuple[Simi
 
     track (f, 3), where each camera was (:func:`east_north_up`), nan: not known; up (3,): of the
     world as found (a straight track says nothing of a roll about it). Half of the worst places are
-    left out, as receivers jump. Raises ValueError for fewer than three places, or a track that
-    stays within three times what it is off.
+    left out, as receivers jump. Raises ValueError for fewer than three places, or a way within
+    three times what it is off.
     """
     upright = _upright(poses, up / np.linalg.norm(up), 1.0, 0.0)
     flat = upright.points(poses[:, :3, 3])
@@ -106,7 +106,7 @@ def by_track(poses: FloatArray, up: FloatArray, track: FloatArray) -> tuple[Simi
         left = np.abs(from_target - factor * from_source)
         weight = 1.0 / np.maximum(left, np.median(left) / 2 + 1e-9)
     off = float(np.sqrt(np.mean(np.sort(left)[: (len(left) + 1) // 2] ** 2)))
-    if not np.abs(from_target).max() > 3 * off or factor == 0:
+    if not np.abs(factor * from_source).max() > 3 * off:
         raise ValueError(f"track: found places that are {off:.1f} m off; expected a longer way.")
     scale, angle = float(np.abs(factor)), float(np.angle(factor))
     cosine, sine = np.cos(angle), np.sin(angle)
