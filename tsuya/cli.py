@@ -245,13 +245,25 @@ def completion(shell: str) -> None:
 
 
 @main.command()
+@click.option(
+    "--drive",
+    type=click.Path(exists=True, path_type=Path),
+    help="What a film or a folder of photographs is good for, instead.",
+)
+@click.option("--focal", type=float, help="Of the drive: its focal length, pixels.")
 @as_json
-def doctor(as_json: bool) -> None:
+@says_errors
+def doctor(drive: Path | None, focal: float | None, as_json: bool) -> None:
     """Check what the project needs of this machine, and draw one picture."""
     from assets_defs.workspace import Workspace
     from tsuya.doctor import examine
 
-    findings = examine(Workspace.of_checkout().pictures / "doctor.png")
+    if drive is not None:
+        from tsuya.drive_doctor import examine_drive
+
+        findings = examine_drive(drive, focal)
+    else:
+        findings = examine(Workspace.of_checkout().pictures / "doctor.png")
     if as_json:
         click.echo(json.dumps({"findings": [vars(finding) for finding in findings]}))
     for finding in findings if not as_json else ():

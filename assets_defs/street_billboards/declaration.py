@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assets_defs.sources import Source
-from assets_defs.street_billboards.given_poses import check_agreement, world_of
+from assets_defs.street_billboards.given_poses import agreement, world_of
 from assets_defs.system import Dimension, System
 from storage.readers.drives import read_drive
 from storage.readers.films import SUFFIXES as FILM_SUFFIXES
@@ -32,7 +32,9 @@ def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
         world = world_of(drive, np.arange(len(drive.times)), settings["camera_height"])
     except ValueError as error:
         raise ValueError(f"{source.name}: {error}") from error
-    check_agreement(drive, world, source.name)
+    fits, sentence = agreement(drive, world)
+    if not fits:
+        raise ValueError(f"{source.name}: {sentence}: intrinsics or poses are wrong.")
 
 
 def _overview(store: VersionedStore, slots: Sequence[Slot]) -> Mapping[str, NDArray[np.uint8]]:
