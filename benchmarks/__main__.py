@@ -19,6 +19,7 @@ NAMES = (
     "btf_paper_training",
     "captures",
     "contents",
+    "drives",
     "faults",
     "fur",
     "house",
@@ -62,6 +63,7 @@ def main() -> None:
     parser.add_argument(
         "--scale", choices=SCALES, default="default", help="paper: an hour, where there is one"
     )
+    parser.add_argument("--real", type=Path, help="drives: a folder in KITTI's layout")
     arguments = parser.parse_args()
     run = importlib.import_module(f"benchmarks.{arguments.name}").run
     wanted = inspect.signature(run).parameters
@@ -69,7 +71,12 @@ def main() -> None:
         parser.error(f"{arguments.name} has no scale {arguments.scale!r}; expected 'default'.")
     if len(arguments.stores) != (2 if arguments.name == "contents" else 0):
         parser.error("two stores go with contents, and none with another name.")
-    figures = run(arguments.scale) if "scale" in wanted else run(*arguments.stores)
+    if arguments.real is not None and "real" not in wanted:
+        parser.error("--real goes with drives.")
+    if "real" in wanted:
+        figures = run(arguments.real)
+    else:
+        figures = run(arguments.scale) if "scale" in wanted else run(*arguments.stores)
     print(json.dumps(figures | {"commit": commit(), "machine": machine()}))
 
 
