@@ -33,23 +33,23 @@ from storage.readers.drives.recordings import (
     file_inside,
 )
 
-_MODEL_FOLDERS = (".", "sparse", "colmap/sparse", "colmap", "dense/sparse", "undistorted/sparse")
+_MODEL_FOLDERS = (
+    ".", "sparse", "colmap/sparse", "colmap", "dense/sparse", "dense/0/sparse",
+    "undistorted/sparse",
+)  # fmt: skip
 _PICTURE_FOLDERS = ("images", "image", "imgs", "pictures", ".")
 _ENDINGS = (".bin", ".txt")  # COLMAP itself prefers the binary one
 _MOST_MODELS = 1000
 
 
 def find_colmap(path: Path) -> Path | None:
-    """The file of images of the model with most of them, in a folder or where it usually lies."""
+    """The file of images of the model with most of them, in a folder or where it usually lies: the
+    first such place whose photographs are there, too."""
+    found = []
     for name in _MODEL_FOLDERS:
-        folder = path / name
-        own = _images_file(folder)
-        if own is not None:
-            return own
-        models = _numbered(folder)
-        if models:
-            return max(models, key=_size)
-    return None
+        models = [_images_file(path / name) or max(_numbered(path / name), key=_size, default=None)]
+        found += [file for file in models if file is not None]
+    return next((file for file in found if _has_pictures(file, path)), next(iter(found), None))
 
 
 def read_colmap(file: Path, root: Path) -> Recording:
@@ -108,6 +108,14 @@ def _size(file: Path) -> int:
         return count_images(file)
     except BadInput:
         return -1
+
+
+def _has_pictures(file: Path, root: Path) -> bool:
+    try:
+        images = read_images(file)
+        return bool(images) and bool(_picture_folder(file, root, images))
+    except BadInput:
+        return False
 
 
 def _picture_folder(file: Path, root: Path, images: Sequence[ColmapImage]) -> Path:

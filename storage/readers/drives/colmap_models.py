@@ -43,7 +43,7 @@ MODELS = {
 
 LARGEST_MODEL = 64 << 30
 """Bytes of a file; it is read piece by piece."""
-MOST_POINTS = 5_000_000
+MOST_POINTS = 1_000_000
 """More are thinned out evenly."""
 
 _LONGEST_NAME = 4096
@@ -130,18 +130,11 @@ def read_rig_frames(file: Path) -> dict[int, int]:
 def read_points(file: Path) -> NDArray[np.float64]:
     """Places (n, 3) float64 of the points, in the file's order; raises BadInput for a broken file.
 
-    Of more than five million every second one, third one and so on.
+    Of more than a million every second one, third one and so on.
     """
     with _opened(file) as stream:
         if file.suffix == ".txt":
-            rows = [
-                finite_numbers(file, f"line {row + 1}", line.split(maxsplit=4)[1:4])
-                for row, line in _lines(stream)
-            ]
-            if any(len(row) != 3 for row in rows):
-                raise BadInput(file, "points", "without three coordinates", "POINT3D_ID X Y Z …")
-            every = 1 + len(rows) // MOST_POINTS
-            return np.array(rows[::every]).reshape(-1, 3)
+            return _text_points(file, stream)
         source = _Binary(file, stream)
         count = source.count("points", 51)
         every = 1 + count // MOST_POINTS
@@ -285,6 +278,20 @@ def _text_image(file: Path, row: int, line: str) -> ColmapImage:
     pose = finite_numbers(file, field, words[1:8])
     number, camera = (_whole(file, field, words[at]) for at in (0, 8))
     return ColmapImage(number, camera, words[9], pose[:4], pose[4:])
+
+
+def _text_points(file: Path, stream: BinaryIO) -> NDArray[np.float64]:
+    kept: list[NDArray[np.float64]] = []
+    every = 1
+    for count, (row, line) in enumerate(_lines(stream)):
+        words = line.split(maxsplit=4)[1:4]
+        if len(words) != 3:
+            raise BadInput(file, f"line {row + 1}", f"{len(words)} numbers", "POINT3D_ID X Y Z …")
+        if count % every == 0:
+            kept.append(finite_numbers(file, f"line {row + 1}", words))
+        if len(kept) > MOST_POINTS:
+            kept, every = kept[::2], 2 * every
+    return np.array(kept).reshape(-1, 3)
 
 
 def _whole(file: Path, field: str, word: str) -> int:

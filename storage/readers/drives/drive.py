@@ -166,8 +166,9 @@ def _left_to_right(names: Sequence[str], poses: NDArray[np.float64]) -> list[str
 
     ``poses`` (c, 4, 4).
     """
-    along = (poses[:, :3, 3] - poses[0, :3, 3]) @ poses[:, :3, 0].mean(axis=0)
-    reach = np.abs(along).max() or 1.0
+    apart = poses[:, :3, 3] - poses[0, :3, 3]
+    along = apart @ poses[:, :3, 0].mean(axis=0)
+    reach = np.abs(apart).max() or 1.0
     return [names[row] for row in np.argsort(np.round(along / reach, 6), kind="stable")]
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Sequence
 
 _DIGITS = re.compile(r"\d+")
 _LONGEST = 18
 """Digits of a number that is one: more are an identifier."""
+_MOST_NUMBERS = 8
+"""Of a name, the last ones."""
 _FEWEST_TOGETHER = 0.75
 """Times a photograph, where cameras took them together: half of the times have two at least."""
 
@@ -31,7 +33,7 @@ def cameras_and_times(names: Sequence[str]) -> list[tuple[str, float]]:
         groups[_DIGITS.sub("#", stem)].append(row)
     found: list[tuple[str, float]] = [("", 0.0)] * len(names)
     for rows in groups.values():
-        numbers = [list(_DIGITS.finditer(stems[row])) for row in rows]
+        numbers = [list(deque(_DIGITS.finditer(stems[row]), _MOST_NUMBERS)) for row in rows]
         chosen = _changing(numbers, stems[rows[0]].rfind("/"))
         for row, matches in zip(rows, numbers, strict=True):
             found[row] = _camera_and_time(stems[row], matches, chosen)

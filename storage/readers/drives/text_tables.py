@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from storage.readers.bad_input import BadInput
 from storage.readers.opening import number, whole_file
 
-LARGEST_TABLE = 64 << 20
+LARGEST_TABLE = 16 << 20
 """Bytes: of some hundred thousand poses."""
 
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")

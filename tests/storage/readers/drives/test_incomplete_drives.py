@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from benchmarks.written_drives import FORMS
-from benchmarks.written_drives.truth import HEIGHT, WIDTH, K, save, true_pictures, true_poses
+from benchmarks.written_drives.truth import HEIGHT, WIDTH, K, rigid, save, true_pictures, true_poses
 from storage.readers import BadInput
 from storage.readers.drives import Drive, read_drive, read_frame, read_masks
 from storage.readers.drives.drive import drive_of
-from storage.readers.drives.recordings import Frame, Lens, Recording
+from storage.readers.drives.recordings import Frame, Lens, Recording, pinhole_lens
 
 
 def written(folder: Path, change: Callable[[Any], object] = lambda top: None) -> Path:
@@ -242,6 +242,26 @@ def test_a_rig_whose_cameras_are_released_one_after_the_other(tmp_path: Path) ->
     moved(2)
     with pytest.raises(BadInput, match="expected a rigid rig"):
         read_drive(path)
+
+
+def test_cameras_that_look_all_around(tmp_path: Path) -> None:
+    """Six in a ring: by their places along what is right for most of them, else by name."""
+    for evenly in (True, False):
+        shots = []
+        for instant in range(3):
+            for number in range(6):
+                heading = np.radians(60 * number if evenly else 30 * (number - 2))
+                ahead = np.array([np.sin(heading), np.cos(heading), 0])
+                right = np.array([np.cos(heading), -np.sin(heading), 0])
+                place = 0.8 * ahead + [5, 70 + 2 * instant, 1.5]
+                turn = np.column_stack([right, [0, 0, -1], ahead])
+                file = tmp_path / f"{instant}{number}.png"
+                save(file, true_pictures()[instant][0])
+                lens = pinhole_lens(K, WIDTH, HEIGHT)
+                shots.append(Frame(f"{5 - number}", instant, file, rigid(turn, place), lens))
+        drive = drive_of(Recording(tmp_path, shots))
+        assert drive.cameras == tuple("012345" if evenly else "543210")
+        np.testing.assert_allclose(drive.poses[1, :, 1, 3], drive.poses[0, :, 1, 3] + 2)
 
 
 # --- Recordings without poses or lenses -----------------------------------------------------------
