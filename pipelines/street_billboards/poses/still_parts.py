@@ -21,11 +21,13 @@ _BLUR = 4.0
 """Pixels of what counts as detail, of a picture 640 wide."""
 _STANDS = 2.5
 """Mean over deviation of the detail of what stands still."""
-_LEAST_DETAIL = 2.5
-"""Codes, of the mean."""
+_LEAST_DETAIL, _LEAST_CONTRAST = 2.5, 12.0
+"""Codes, of the mean: of a rim, of letters."""
 _SMOOTH = 0.4
 """Deviation of the detail, of the picture's median, below which nothing passes."""
-_LEAST_AREA = 1.5e-4
+_SHARE = 0.2
+"""Of the pixels around one that stand still, where it does, too."""
+_LEAST_AREA = 3e-4
 """Of the picture: a smaller spot is chance."""
 _RIM = 0.35
 """Share of the columns of what lies below that have a rim which stands still."""
@@ -43,13 +45,18 @@ def still_parts(pictures: Iterable[NDArray[np.uint8]]) -> NDArray[np.bool_]:
     total: Any = 0.0
     squares: Any = 0.0
     for picture in pictures:
-        detail = _detail(picture)
-        total, squares, count = total + detail, squares + detail**2, count + 1
+        both = np.stack([_detail(picture), picture.astype(np.float32)])
+        total, squares, count = total + both, squares + both**2, count + 1
     if count < FEWEST:
         raise ValueError(f"still parts: found {count} frames; expected at least {FEWEST}.")
     mean = total / count
     deviation = np.sqrt(np.maximum(squares / count - mean**2, 0))
-    return _found(mean, deviation)
+    detail = np.abs(mean[0])
+    # A bonnet's rim stays as much brighter as it is than what is around. Letters stay as bright as
+    # they are, whatever passes around them; so does the sky beside a roof, which is no letter.
+    rims = (detail > _STANDS * deviation[0]) & (detail > _LEAST_DETAIL)
+    letters = (detail > _STANDS * deviation[1]) & (detail > _LEAST_CONTRAST)
+    return _found(rims | letters, deviation[0])
 
 
 def _scaled(pixels: float, width: int) -> float:
@@ -63,17 +70,17 @@ def _detail(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(values - cv2.GaussianBlur(values, (0, 0), _scaled(_BLUR, picture.shape[1])))
 
 
-def _found(mean: NDArray[np.floating], deviation: NDArray[np.floating]) -> NDArray[np.bool_]:
+def _found(much: NDArray[np.bool_], deviation: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Of pixels that stand still and the deviation of the detail."""
     import cv2
 
-    height, width = mean.shape
+    height, width = much.shape
     size = int(2 * round(_scaled(_BLUR, width)) + 1)
-    # Around a pixel: single ones of a wall that passes are by chance as bright in every frame.
-    much = np.sqrt(cv2.boxFilter(mean**2, -1, (size, size)))
-    little = np.sqrt(cv2.boxFilter(deviation**2, -1, (size, size)))
-    stands = (much > _STANDS * little) & (much > _LEAST_DETAIL)
+    # Single pixels of a wall that passes are by chance as bright in every frame: some together.
+    stands = cv2.boxFilter(much.astype(np.float32), -1, (size, size)) > _SHARE
     stands = _large(stands, _LEAST_AREA * height * width)
-    smooth = little < _SMOOTH * np.median(little)
+    passing = np.sqrt(cv2.boxFilter(np.asarray(deviation) ** 2, -1, (size, size)))
+    smooth = passing < _SMOOTH * np.median(passing)
     grown = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     below = _below(_closed(smooth | stands, grown), stands)
     widened = int(2 * round(_scaled(_GROWN, width)) + 1)
