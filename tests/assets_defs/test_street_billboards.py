@@ -18,7 +18,7 @@ from assets_defs.street_billboards.datasets import compressed_of, pages_of, view
 from assets_defs.street_billboards.graph import STREET
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import billboards, figures, live_tiles, octree
-from pipelines.street_billboards.capture import exposure, point_fusion, stereo
+from pipelines.street_billboards.capture import exposure, plane_sweep, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, processor_street, quads, street_stage
 from pipelines.street_billboards.frames import draw_view
 from pipelines.street_billboards.street_model import StreetModel
@@ -91,6 +91,37 @@ def test_stored_streets_load_as_what_they_are_drawn_from(good: Any) -> None:
     picture = draw_view(street, drive["intrinsics"].values[1], pose, size)
     np.testing.assert_array_equal(picture, shown["beside"].values[0, 0])
     assert load("view_textures").first[-1] == len(load("view_textures").colours)
+
+
+@pytest.mark.slow
+def test_a_drive_of_one_camera_goes_through_the_whole_graph(make_house: Any) -> None:
+    """And its checks find what is wrong with a plane sweep as they do with stereo."""
+    house = make_house()
+    house.launcher.launch(Request(STREET, [KEYS], "test", {"cameras": 1}))
+    store = house.workspace.store
+    for plan in STREET.plans.values():
+        slot = STREET.slot(plan.name, KEYS)
+        verdicts = store.verdicts(slot, store.current(slot))
+        assert set(verdicts) == {check.name for check in plan.checks}
+        assert all(verdict["passed"] for verdict in verdicts.values())
+    drive, frames = _open(house, "drive_frames"), _open(house, "street_frames")
+    assert drive.sizes["camera"] == _open(house, "depth_maps").sizes["camera"] == 1
+    (held,) = np.flatnonzero(drive["held_out"].values)
+    np.testing.assert_array_equal(frames["truth"].values[0], drive["photographs"].values[held, 0])
+    for check, wrong in (("depth_error", _swept_deeper), ("deviation_honest", _swept_too_surely)):
+        with pytest.MonkeyPatch.context() as patch:
+            regression = Regression(check, plane_sweep, "sweep_depth", wrong, KEYS)
+            assert_check_finds(house, STREET, regression, patch)
+
+
+def _swept_deeper(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    found = right(*arguments, **options)
+    return found._replace(depth=found.depth * np.float32(1.1))
+
+
+def _swept_too_surely(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    found = right(*arguments, **options)
+    return found._replace(deviation=found.deviation * np.float32(0.3))
 
 
 @pytest.mark.slow
@@ -226,6 +257,11 @@ def _deeper(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     return maps._replace(depth=maps.depth * np.float32(1.1))
 
 
+def _too_sure(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    maps = right(*arguments, **options)
+    return maps._replace(deviation=maps.deviation * np.float32(0.3))
+
+
 def _half_unknown(right: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     maps = right(*arguments, **options)
     maps.depth[:, ::2] = np.nan
@@ -355,6 +391,7 @@ REGRESSIONS = (
     Regression("frame_spacing", city_drive, "plan_drive", _slower, KEYS),
     Regression("stereo_bad05", stereo, "refine_disparities", _off_by_a_pixel, KEYS),
     Regression("depth_error", stereo, "depth_maps", _deeper, KEYS),
+    Regression("deviation_honest", stereo, "depth_maps", _too_sure, KEYS),
     Regression("known_share", stereo, "depth_maps", _half_unknown, KEYS),
     Regression(
         "agreement", point_fusion, "photometric_agreement", lambda right, *a: 0.5 * right(*a), KEYS

@@ -19,13 +19,15 @@ View = tuple[int, int]
 """Frame and camera."""
 
 _FEATURES = 1500
-_KEPT = 400
+_KEPT = 200
 """Features of a star at most: those that most photographs show."""
 _RATIO = 0.8
 """Of the best match's distance to the second best's (Lowe 2004), at most."""
 _OFF_LINE = 1.0
 """Pixels from the epipolar line of a pair's own geometry, beyond which a match is none."""
 _LEAST_MATCHES = 20
+_LEAST_SHARE = 0.5
+"""Of the matches: where fewer fit one epipolar geometry, walls look alike and none is sure."""
 _ROUNDS = 3
 _USUAL = 1.0
 """Pixels: a residual from which on a sighting counts for less."""
@@ -116,7 +118,7 @@ def _matched(
     _, inside = cv2.findFundamentalMat(
         pixels[ours], their_pixels[theirs], cv2.USAC_MAGSAC, _OFF_LINE, 0.999, 2000
     )
-    if inside is None or inside.sum() < _LEAST_MATCHES:
+    if inside is None or inside.sum() < max(_LEAST_MATCHES, _LEAST_SHARE * len(kept)):
         return seen
     good = inside.ravel() > 0
     seen[ours[good]] = their_pixels[theirs[good]]

@@ -37,10 +37,14 @@ _SURELY = 0.85
 """Share that they confirm where no other reading is asked about."""
 _BETTER, _EQUAL = 0.15, 0.05
 """Of it: how much more another reading has to confirm, and what two that are as good may differ."""
+_AS_EXACT = 1.1
+"""Of the least mean residual: what two readings that are as good may differ."""
 _NEARLY = 12.0
 """Pixels within which poses are right that are not exact."""
-_FOCAL_STEPS = np.exp(np.arange(-60, 61) * 0.005)
-"""Factors of the focal length that are tried: by 0.5 %, up to 35 %."""
+_FOCAL_STEPS = np.exp(np.arange(-15, 16) * 0.02)
+"""Factors of the focal length that are tried: by 2 %, up to 35 %."""
+_FINE_STEPS = np.exp(np.arange(-9, 10) * 0.0025)
+"""Of the best of them, that are tried then."""
 _FOCAL_GAIN = 0.9
 """Mean residual with another focal length, over that with the given one, from which on it is
 taken."""
@@ -192,8 +196,10 @@ def _best_reading(
     if share >= best - _BETTER:
         return given.poses, []
     equal = [one for score, one in scores if score >= best - _EQUAL]
-    chosen = min(equal, key=lambda one: one.faults)
-    return chosen.poses, [chosen.name]
+    left = [mean_residual([sights(s, one.poses, intrinsics) for s in stars]) for one in equal]
+    exact = [(o.faults, off, k) for k, (o, off) in enumerate(zip(equal, left, strict=True))]
+    _, _, row = min(one for one in exact if one[1] <= _AS_EXACT * min(left))
+    return equal[row].poses, [equal[row].name]
 
 
 def _confirmed(stars: Sequence[Star], poses: FloatArray, intrinsics: FloatArray) -> float:
@@ -236,6 +242,7 @@ def _readings(poses: FloatArray) -> Iterator[_Reading]:
                 plain = np.array_equal(axes, np.eye(3))
                 opengl = np.array_equal(axes, np.diag([1.0, -1.0, -1.0]))
                 faults = 2 * inverted + 2 * order + (0 if plain else 1 if opengl else 3 + 3 * flips)
+                faults += bool(_up(read)[2] < -np.cos(np.radians(_UPRIGHT)))
                 yield _Reading(_said(inverted, way, axes), faults, np.ascontiguousarray(read))
 
 
@@ -270,25 +277,28 @@ def _right_focal(
     stars: Sequence[Star], poses: FloatArray, intrinsics: FloatArray
 ) -> tuple[FloatArray, list[str]]:
     """Intrinsics whose focal lengths, times one factor, explain the photographs best."""
-    residuals = np.array(
-        [
-            mean_residual([sights(star, poses, _zoomed(intrinsics, factor)) for star in stars])
-            for factor in _FOCAL_STEPS
-        ]
-    )
-    best = int(residuals.argmin())
-    as_good = _FOCAL_STEPS[residuals <= _FOCAL_EQUAL * residuals[best]]
+
+    def left(factor: float) -> float:
+        lenses = _zoomed(intrinsics, factor)
+        return mean_residual([sights(star, poses, lenses) for star in stars])
+
+    coarse = np.array([left(factor) for factor in _FOCAL_STEPS])
+    tried = _FOCAL_STEPS[coarse.argmin()] * _FINE_STEPS
+    residuals = np.array([left(factor) for factor in tried])
+    least = float(residuals.min())
+    factor = float(tried[residuals.argmin()])
+    every = np.concatenate([_FOCAL_STEPS, tried])
+    as_good = every[np.concatenate([coarse, residuals]) <= _FOCAL_EQUAL * least]
     wide = float(as_good.max() / as_good.min()) - 1
-    factor = float(_FOCAL_STEPS[best])
-    given = float(residuals[len(_FOCAL_STEPS) // 2])
+    given = float(coarse[len(_FOCAL_STEPS) // 2])
     if wide > _FOCAL_TOLD:
         return intrinsics, [
             f"The focal length cannot be told from this drive to better than {wide:.0%}: it is "
             "taken as given."
         ]
-    if abs(factor - 1) < _FOCAL_RIGHT or residuals[best] > _FOCAL_GAIN * given:
+    if abs(factor - 1) < _FOCAL_RIGHT or least > _FOCAL_GAIN * given:
         return intrinsics, []
-    if best in (0, len(_FOCAL_STEPS) - 1):
+    if coarse.argmin() in (0, len(_FOCAL_STEPS) - 1):
         raise ValueError(
             f"The focal length is off by more than {abs(factor - 1):.0%}; expected one with which "
             "poses and photographs agree."
@@ -310,8 +320,7 @@ def _zoomed(intrinsics: FloatArray, factor: float) -> FloatArray:
 
 def _upright(poses: FloatArray, road: Road | None) -> tuple[FloatArray, list[str]]:
     """Poses with z up; as they are where z is nearly up."""
-    mean = -poses[..., :3, 1].reshape(-1, 3).mean(axis=0)
-    up = mean / np.linalg.norm(mean) if road is None else road.up
+    up = _up(poses) if road is None else road.up
     if up[2] > np.cos(np.radians(_UPRIGHT)):
         return poses, []
     axis = int(np.abs(up).argmax())
@@ -322,6 +331,12 @@ def _upright(poses: FloatArray, road: Road | None) -> tuple[FloatArray, list[str
     turn[:3, :3] = _turn_to_z(straight if along else up)
     name = f"{'-' if straight[axis] < 0 else ''}{'xyz'[axis]}" if along else "an axis of its own"
     return turn @ poses, [f"The world's up is {name}, not z: it is turned."]
+
+
+def _up(poses: FloatArray) -> FloatArray:
+    """What is up for the cameras, (3,)."""
+    mean: FloatArray = -poses[..., :3, 1].reshape(-1, 3).mean(axis=0)
+    return mean / np.linalg.norm(mean)
 
 
 def _turn_to_z(up: FloatArray) -> FloatArray:

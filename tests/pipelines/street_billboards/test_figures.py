@@ -12,13 +12,16 @@ from hypothesis import strategies as st
 from pipelines.drawing.colour import encode_srgb
 from pipelines.geometry.cameras import unproject_depth
 from pipelines.street_billboards.figures import (
+    bad_depth_share,
     bad_pixel_share,
     depth_error,
+    deviation_honest,
     differing_share,
     dilated,
     excess_rank,
     exposure_spread,
     frame_spacing,
+    known_share,
     largest_log_gain,
     match_exposure,
     mean_psnr,
@@ -183,6 +186,26 @@ def test_depth_error_is_the_share_that_was_spoilt(share: float, seed: int) -> No
     depth = truth * np.where(spoilt, rng.choice([0.9, 1.1, np.nan], truth.shape), 1.02)
     expected = spoilt[truth < 20].mean()
     assert depth_error(depth, truth) == pytest.approx(expected)
+
+
+def test_what_is_known_bad_and_honest_by_hand() -> None:
+    truth = np.array([10.0, 10.0, 24.0, 30.0, np.inf, 40.0, 12.0])
+    depth = np.array([10.4, 11.0, np.nan, 20.0, 9.0, 39.0, 12.1])
+    deviation = np.array([0.3, 0.4, np.nan, 6.0, 3.0, 0.1, 0.01])
+    assert known_share(depth, truth) == pytest.approx(3 / 4)
+    # Asked: 10.4 right, 11 bad, 20 for 30 bad, 9 for the sky bad, 12.1 right; 39 is too far.
+    assert bad_depth_share(depth, truth) == pytest.approx(3 / 5)
+    # Within two deviations: 10.4 for 10, 20 for 30.
+    assert deviation_honest(depth, deviation, truth) == pytest.approx(2 / 5)
+
+
+def test_deviations_are_honest_where_errors_are_as_they_say() -> None:
+    rng = np.random.default_rng(3)
+    deviation = rng.uniform(0.05, 0.5, 20_000)
+    truth = rng.uniform(5, 20, 20_000)
+    depth = truth + deviation * rng.standard_normal(20_000)
+    assert deviation_honest(depth, deviation, truth) == pytest.approx(0.9545, abs=0.006)
+    assert deviation_honest(depth, 0.3 * deviation, truth) < 0.5
 
 
 def test_stray_points_are_those_before_the_surface() -> None:

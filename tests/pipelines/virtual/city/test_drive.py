@@ -23,6 +23,13 @@ def test_poses_are_rotations_that_look_ahead_with_the_horizon_level() -> None:
     np.testing.assert_array_equal(drive.poses[..., 3, :], np.broadcast_to([0, 0, 0, 1], (50, 3, 4)))
 
 
+def test_one_camera_is_the_middle_one_of_three() -> None:
+    alone, three = plan_drive(9, 2.0, 64, 40, seed=3, cameras=1), plan_drive(9, 2.0, 64, 40, seed=3)
+    np.testing.assert_array_equal(alone.poses, three.poses[:, 1:2])
+    np.testing.assert_array_equal(alone.gains, three.gains[:, 1:2])
+    np.testing.assert_array_equal(alone.intrinsics, three.intrinsics[1:2])
+
+
 def test_the_car_keeps_its_lane_and_heads_where_it_goes() -> None:
     drive = plan_drive(400, 0.5, 640, 400, camera_height=2.1, seed=9)
     middle = drive.poses[:, 1, :3, 3]
