@@ -21,7 +21,13 @@ def world_of(drive: Drive, chosen: NDArray[np.integer], camera_height: float) ->
     def load(frame: int) -> NDArray[np.uint8]:
         return read_frame(drive, int(chosen[frame]))
 
-    return right_world(load, drive.poses[chosen], drive.intrinsics, camera_height=camera_height)
+    return right_world(
+        load,
+        drive.poses[chosen],
+        drive.intrinsics,
+        camera_height=camera_height,
+        is_metric=drive.metric,
+    )
 
 
 def agreement(drive: Drive, world: World) -> tuple[bool, str]:

@@ -25,6 +25,7 @@ from pipelines.street_billboards.poses.sight_stars import (
     mean_residual,
     sights,
 )
+from pipelines.street_billboards.poses.units import in_metres
 
 FloatArray = NDArray[np.float64]
 
@@ -56,9 +57,6 @@ _FOCAL_EQUAL = 1.05
 """Over the least residual: what explains the photographs as well."""
 _UPRIGHT = 20.0
 """Degrees between two directions that are one: roads climb, cameras are mounted as they are."""
-_HEIGHTS = (0.9, 3.2)
-"""Metres above the road at which cars carry cameras."""
-_UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "feet": 0.3048, "kilometres": 1e3}
 
 
 class World(NamedTuple):
@@ -89,13 +87,14 @@ def right_world(
     intrinsics: FloatArray,
     *,
     camera_height: float = 1.5,
+    is_metric: bool = False,
 ) -> World:
     """The world in which a drive's photographs agree, z up and in metres.
 
     load: photographs (c, h, w, 3) of one frame, sRGB, undistorted, in the order of time; poses
     (f, c, 4, 4) as given, meant as camera to world with OpenCV's axes; intrinsics (c, 3, 3),
     pixels; camera_height: metres above the road, which the unit is told by where it is none of the
-    usual ones. Some dozen frames are looked at.
+    usual ones; is_metric: the unit is known to be the metre. Some dozen frames are looked at.
 
     Raises ValueError with one sentence where poses are no rigid motions, where the photographs show
     too little that several of them share, and where no reading of the poses fits them.
@@ -103,7 +102,9 @@ def right_world(
     check_rigid(poses)
     order = along_the_way(poses[:, 0, :3, 3])
     stars = find_stars(lambda frame: load(int(order[frame])), windows(len(poses)))
-    found = read_world(stars, poses[order], intrinsics, camera_height=camera_height)
+    found = read_world(
+        stars, poses[order], intrinsics, camera_height=camera_height, is_metric=is_metric
+    )
     if np.array_equal(order, np.arange(len(poses))):
         return found
     said = "The frames' times are out of order: they are taken in the order of their way."
@@ -111,7 +112,12 @@ def right_world(
 
 
 def read_world(
-    stars: Sequence[Star], poses: FloatArray, intrinsics: FloatArray, *, camera_height: float
+    stars: Sequence[Star],
+    poses: FloatArray,
+    intrinsics: FloatArray,
+    *,
+    camera_height: float,
+    is_metric: bool = False,
 ) -> World:
     """``right_world`` from what photographs share (``sight_stars.find_stars``)."""
     if sum(int(np.isfinite(star.seen[..., 0]).sum()) for star in stars) < _LEAST_SIGHTS:
@@ -124,7 +130,7 @@ def read_world(
     _check_confirmed(stars, read, lens)
     road = find_road(stars, read, lens)
     upright, turned = _upright(read, road)
-    scaled, unit = _in_metres(upright, road, camera_height)
+    scaled, unit = (upright, []) if is_metric else in_metres(upright, road, camera_height)
     return World(scaled, lens, np.arange(len(poses)), (*notes, *more, *turned, *unit))
 
 
@@ -345,29 +351,3 @@ def _turn_to_z(up: FloatArray) -> FloatArray:
     x = np.cross(beside, up)
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(up, x), up])
-
-
-def _in_metres(
-    poses: FloatArray, road: Road | None, camera_height: float
-) -> tuple[FloatArray, list[str]]:
-    """Poses in metres, by how high the cameras are above the road."""
-    if road is None:
-        return poses, ["No road is seen below the cameras: the unit is taken for the metre."]
-    low, high = _HEIGHTS
-    if low <= road.height <= high:
-        return poses, []
-    fits = [name for name, unit in _UNITS.items() if low <= road.height * unit <= high]
-    if fits:
-        factor, said = (
-            _UNITS[fits[0]],
-            f"The unit is {fits[0]}, by the cameras' height above the road",
-        )
-    else:
-        factor = camera_height / road.height
-        said = (
-            f"The unit is {factor:.4g} m, if the cameras are {camera_height:g} m above the road "
-            "(camera_height)"
-        )
-    made = poses.copy()
-    made[..., :3, 3] *= factor
-    return made, [f"{said}: it is scaled."]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,6 +79,10 @@ FORMATS = (
         find_colmap,
         read_colmap,
     ),
+)
+"""The most specific first: what a folder is in several of is read as the first of them."""
+
+UNPOSED = (
     Format(
         "a film",
         "film.mp4, .mov, .mkv, .avi …",
@@ -96,7 +100,7 @@ FORMATS = (
         read_photographs_recording,
     ),
 )
-"""The most specific first: what a folder is in several of is read as the first of them."""
+"""What is read where there is none of these: nobody says where it was taken."""
 
 
 def read_recording(path: Path) -> Recording:
@@ -111,14 +115,15 @@ def read_recording(path: Path) -> Recording:
 
 
 def _recording(path: Path) -> Recording:
-    found = [(known, file) for known in FORMATS if (file := known.find(path)) is not None]
+    found = _those_of(FORMATS, path) or _those_of(UNPOSED, path)
     if not found:
         what = "a folder without any of these" if path.is_dir() else "a file"
         raise BadInput(
             path,
             "drive",
             what if path.exists() else "missing",
-            "one of " + "; ".join(f"{known.known_by} ({known.name})" for known in FORMATS),
+            "one of "
+            + "; ".join(f"{known.known_by} ({known.name})" for known in (*FORMATS, *UNPOSED)),
         )
     known, file = found[0]
     recording = known.read(file, path)
@@ -127,3 +132,7 @@ def _recording(path: Path) -> Recording:
         return recording
     note = f"Read as {known.name}; the folder is also in the form of {others}, which is not read."
     return recording._replace(notes=(note, *recording.notes))
+
+
+def _those_of(formats: Sequence[Format], path: Path) -> list[tuple[Format, Path]]:
+    return [(known, file) for known in formats if (file := known.find(path)) is not None]
