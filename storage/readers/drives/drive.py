@@ -15,7 +15,7 @@ from storage.readers.drives.driven import Drive
 from storage.readers.drives.formats import read_recording
 from storage.readers.drives.headers import check_size, photograph_size
 from storage.readers.drives.instants import Instant, instants, with_absent
-from storage.readers.drives.lenses import panorama_views, pinhole_of
+from storage.readers.drives.lenses import panorama_views, pinhole_of, scaled_lens
 from storage.readers.drives.naming import by_number
 from storage.readers.drives.recordings import (
     PANORAMA,
@@ -88,7 +88,7 @@ def _drive(recording: Recording) -> Drive:
         names = _left_to_right(names, poses[0])
         poses = _checked(recording, moments, names)
     photographs = [[moment.get(name) for name in names] for moment in moments]
-    lenses = _checked_lenses(photographs)
+    lenses, scaled = _checked_lenses(names, photographs)
     firsts = [next(lens for lens in column if lens) for column in zip(*lenses, strict=True)]
     pinholes = [pinhole_of(lens) for lens in firsts]
     sizes = np.array([(width, height) for _, width, height in pinholes])
@@ -110,7 +110,7 @@ def _drive(recording: Recording) -> Drive:
         points=recording.points,
         metric=recording.metric,
         up_known=recording.up_known,
-        notes=(*recording.notes, *missing, *told),
+        notes=(*recording.notes, *missing, *scaled, *told),
     )
 
 
@@ -186,23 +186,42 @@ def _checked(
 
 
 def _checked_lenses(
-    photographs: Sequence[Sequence[Frame | None]],
-) -> tuple[tuple[Lens | None, ...], ...]:
-    """Each photograph's lens, its size compared with the header's; of an unknown one the size."""
-    rows = []
-    for row in photographs:
+    names: Sequence[str], photographs: Sequence[Sequence[Frame | None]]
+) -> tuple[tuple[tuple[Lens | None, ...], ...], list[str]]:
+    """Each photograph's lens, its size compared with the header's; of an unknown one the size.
+
+    All photographs of a camera may be smaller or larger than its lens says, as they are where
+    somebody shrank them: the lens is scaled, and that is said.
+    """
+    columns, notes = [], []
+    for name, own in zip(names, zip(*photographs, strict=True), strict=True):
+        frames = [frame for frame in own if frame]
+        found = {frame.photograph: photograph_size(frame.photograph) for frame in frames}
+        said = {(frame.lens.w, frame.lens.h) for frame in frames if frame.lens}
+        size = next(iter(found.values()))
+        shrunk = len(set(found.values())) == len(said) == 1 and _alike(size, *said)
+        if shrunk:
+            notes.append(
+                f"The photographs of camera {shortened(name, 40)} have {size[0]} x {size[1]} "
+                "pixels, not those of its lens: that is scaled."
+            )
         lenses: list[Lens | None] = []
-        for frame in row:
+        for frame in own:
             if frame is None:
                 lenses.append(None)
                 continue
-            size = photograph_size(frame.photograph)
-            nothing = (np.nan,) * 4
-            lens = frame.lens or Lens(PINHOLE, *size, *nothing)
-            check_size(frame.photograph, size, (lens.w, lens.h))
+            own_size = found[frame.photograph]
+            lens = frame.lens or Lens(PINHOLE, *own_size, *((np.nan,) * 4))
+            lens = scaled_lens(lens, *own_size) if shrunk else lens
+            check_size(frame.photograph, own_size, (lens.w, lens.h))
             lenses.append(lens)
-        rows.append(tuple(lenses))
-    return tuple(rows)
+        columns.append(lenses)
+    return tuple(zip(*columns, strict=True)), notes
+
+
+def _alike(size: tuple[int, int], said: tuple[int, int]) -> bool:
+    """Whether two sizes differ, but not in shape by more than a pixel."""
+    return size != said and abs(size[0] * said[1] - size[1] * said[0]) <= max(said)
 
 
 def _notes(

@@ -24,6 +24,19 @@ def pinhole_of(lens: Lens) -> tuple[NDArray[np.float64], int, int]:
     return np.array([[lens.fl_x, 0, lens.cx], [0, lens.fl_y, lens.cy], [0, 0, 1]]), lens.w, lens.h
 
 
+def scaled_lens(lens: Lens, width: int, height: int) -> Lens:
+    """The lens of a photograph that was made smaller or larger."""
+    across, down = width / lens.w, height / lens.h
+    return lens._replace(
+        w=width,
+        h=height,
+        fl_x=lens.fl_x * across,
+        fl_y=lens.fl_y * down,
+        cx=(lens.cx + 0.5) * across - 0.5,
+        cy=(lens.cy + 0.5) * down - 0.5,
+    )
+
+
 def panorama_views(frame: Frame) -> list[Frame]:
     """A panorama as the photographs of four cameras at its place; any other one as it is."""
     if frame.lens is None or frame.lens.model != PANORAMA:
