@@ -105,14 +105,14 @@ def _places(
 def _panorama_places(
     lens: Lens, intrinsics: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    rows, columns = np.mgrid[:height, :width].astype(np.float64)
-    right = (columns - intrinsics[0, 2]) / intrinsics[0, 0]
-    below = (rows - intrinsics[1, 2]) / intrinsics[1, 1]
+    right = (np.arange(width) - intrinsics[0, 2]) / intrinsics[0, 0]
+    below = (np.arange(height) - intrinsics[1, 2]) / intrinsics[1, 1]
     longitude = np.arctan(right) + np.radians(lens.azimuth)
-    latitude = np.arctan2(below, np.hypot(right, 1))
+    latitude = np.arctan2(below[:, None], np.hypot(right, 1))
     across = (longitude / (2 * np.pi) + 0.5) * lens.w - 0.5
     down = (latitude / np.pi + 0.5) * lens.h - 0.5
-    return across.astype(np.float32), down.astype(np.float32)
+    across = np.broadcast_to(across.astype(np.float32), (height, width))
+    return np.ascontiguousarray(across), down.astype(np.float32)
 
 
 def _to_the_right(azimuth: float) -> NDArray[np.float64]:
