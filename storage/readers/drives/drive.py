@@ -15,7 +15,7 @@ from storage.readers.drives.driven import Drive
 from storage.readers.drives.formats import read_recording
 from storage.readers.drives.headers import check_size, photograph_size
 from storage.readers.drives.instants import Instant, instants, with_absent
-from storage.readers.drives.lenses import panorama_views, pinhole_of, scaled_lens
+from storage.readers.drives.lenses import fitted_lens, panorama_views, pinhole_of
 from storage.readers.drives.naming import by_number
 from storage.readers.drives.recordings import (
     PANORAMA,
@@ -88,12 +88,12 @@ def _drive(recording: Recording) -> Drive:
         names = _left_to_right(names, poses[0])
         poses = _checked(recording, moments, names)
     photographs = [[moment.get(name) for name in names] for moment in moments]
-    lenses, scaled = _checked_lenses(names, photographs)
+    lenses = _checked_lenses(photographs)
     firsts = [next(lens for lens in column if lens) for column in zip(*lenses, strict=True)]
     pinholes = [pinhole_of(lens) for lens in firsts]
     sizes = np.array([(width, height) for _, width, height in pinholes])
     present = np.array([[frame is not None for frame in row] for row in photographs])
-    told = _notes(names, frames, moments, lenses, sizes)
+    told = _notes(names, frames, moments, lenses, sizes) + _shrunk(names, photographs, lenses)
     return Drive(
         file=file,
         cameras=tuple(names),
@@ -110,7 +110,7 @@ def _drive(recording: Recording) -> Drive:
         points=recording.points,
         metric=recording.metric,
         up_known=recording.up_known,
-        notes=(*recording.notes, *missing, *scaled, *told),
+        notes=(*recording.notes, *missing, *told),
     )
 
 
@@ -186,42 +186,46 @@ def _checked(
 
 
 def _checked_lenses(
-    names: Sequence[str], photographs: Sequence[Sequence[Frame | None]]
-) -> tuple[tuple[tuple[Lens | None, ...], ...], list[str]]:
-    """Each photograph's lens, its size compared with the header's; of an unknown one the size.
-
-    All photographs of a camera may be smaller or larger than its lens says, as they are where
-    somebody shrank them: the lens is scaled, and that is said.
-    """
-    columns, notes = [], []
-    for name, own in zip(names, zip(*photographs, strict=True), strict=True):
-        frames = [frame for frame in own if frame]
-        found = {frame.photograph: photograph_size(frame.photograph) for frame in frames}
-        said = {(frame.lens.w, frame.lens.h) for frame in frames if frame.lens}
-        size = next(iter(found.values()))
-        shrunk = len(set(found.values())) == len(said) == 1 and _alike(size, *said)
-        if shrunk:
-            notes.append(
-                f"The photographs of camera {shortened(name, 40)} have {size[0]} x {size[1]} "
-                "pixels, not those of its lens: that is scaled."
-            )
+    photographs: Sequence[Sequence[Frame | None]],
+) -> tuple[tuple[Lens | None, ...], ...]:
+    """Each photograph's lens, its size compared with the header's; of an unknown one the size."""
+    rows = []
+    for row in photographs:
         lenses: list[Lens | None] = []
-        for frame in own:
+        for frame in row:
             if frame is None:
                 lenses.append(None)
                 continue
-            own_size = found[frame.photograph]
-            lens = frame.lens or Lens(PINHOLE, *own_size, *((np.nan,) * 4))
-            lens = scaled_lens(lens, *own_size) if shrunk else lens
-            check_size(frame.photograph, own_size, (lens.w, lens.h))
-            lenses.append(lens)
-        columns.append(lenses)
-    return tuple(zip(*columns, strict=True)), notes
+            size = photograph_size(frame.photograph)
+            nothing = (np.nan,) * 4
+            lens = frame.lens or Lens(PINHOLE, *size, *nothing)
+            lenses.append(fitted_lens(frame.photograph, lens, size))
+        rows.append(tuple(lenses))
+    return tuple(rows)
 
 
-def _alike(size: tuple[int, int], said: tuple[int, int]) -> bool:
-    """Whether two sizes differ, but not in shape by more than a pixel."""
-    return size != said and abs(size[0] * said[1] - size[1] * said[0]) <= max(said)
+def _shrunk(
+    names: Sequence[str],
+    photographs: Sequence[Sequence[Frame | None]],
+    lenses: Sequence[Sequence[Lens | None]],
+) -> list[str]:
+    """What is to be said of cameras whose lenses were scaled; that is all photographs or none."""
+    notes = []
+    columns = zip(names, zip(*photographs, strict=True), zip(*lenses, strict=True), strict=True)
+    for name, frames, own in columns:
+        pairs = [(frame, lens) for frame, lens in zip(frames, own, strict=True) if frame and lens]
+        other = [(frame, lens) for frame, lens in pairs if frame.lens and frame.lens.w != lens.w]
+        if not other:
+            continue
+        frame, lens = other[0]
+        if len(other) < len(pairs) or len({(own.w, own.h) for _, own in pairs}) > 1:
+            said = frame.lens or lens
+            check_size(frame.photograph, (lens.w, lens.h), (said.w, said.h))
+        notes.append(
+            f"The photographs of camera {shortened(name, 40)} have {lens.w} x {lens.h} pixels, "
+            "not those of its lens: that is scaled."
+        )
+    return notes
 
 
 def _notes(

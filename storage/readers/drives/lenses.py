@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from storage.readers.drives.headers import check_size
 from storage.readers.drives.recordings import FISHEYE, PANORAMA, PINHOLE, Frame, Lens
 
 AZIMUTHS = (0, 90, 180, 270)
@@ -24,17 +26,18 @@ def pinhole_of(lens: Lens) -> tuple[NDArray[np.float64], int, int]:
     return np.array([[lens.fl_x, 0, lens.cx], [0, lens.fl_y, lens.cy], [0, 0, 1]]), lens.w, lens.h
 
 
-def scaled_lens(lens: Lens, width: int, height: int) -> Lens:
-    """The lens of a photograph that was made smaller or larger."""
-    across, down = width / lens.w, height / lens.h
-    return lens._replace(
-        w=width,
-        h=height,
-        fl_x=lens.fl_x * across,
-        fl_y=lens.fl_y * down,
-        cx=(lens.cx + 0.5) * across - 0.5,
-        cy=(lens.cy + 0.5) * down - 0.5,
-    )
+def fitted_lens(photograph: Path, lens: Lens, size: tuple[int, int]) -> Lens:
+    """The lens of a photograph of another ``size`` (width, height) than it says: scaled, where the
+    shape is the same to a pixel. Raises BadInput for another shape."""
+    if size == (lens.w, lens.h):
+        return lens
+    cut = size[0] == lens.w or size[1] == lens.h
+    if cut or abs(size[0] * lens.h - size[1] * lens.w) > max(lens.w, lens.h):
+        check_size(photograph, size, (lens.w, lens.h))
+    across, down = size[0] / lens.w, size[1] / lens.h
+    centre = (lens.cx + 0.5) * across - 0.5, (lens.cy + 0.5) * down - 0.5
+    focal = lens.fl_x * across, lens.fl_y * down
+    return Lens(lens.model, *size, *focal, *centre, lens.coefficients, lens.azimuth)
 
 
 def panorama_views(frame: Frame) -> list[Frame]:

@@ -193,6 +193,10 @@ def test_photographs_that_somebody_shrank_have_their_lens_shrunk(tmp_path: Path)
     with pytest.raises(BadInput, match=r"right_\d.png: size is 24 x 16 pixels; expected 48 x 32"):
         read_drive(path)
     for instant in range(6):
+        save(path / f"right_{instant}.png", true_pictures()[instant][1][:-1])
+    with pytest.raises(BadInput, match="size is 48 x 31 pixels; expected 48 x 32"):
+        read_drive(path)
+    for instant in range(6):
         save(path / f"right_{instant}.png", half[instant][:-2])
     with pytest.raises(BadInput, match="size is 24 x 14 pixels; expected 48 x 32"):
         read_drive(path)
