@@ -15,7 +15,7 @@ from storage.readers.drives.driven import Drive
 from storage.readers.drives.formats import read_recording
 from storage.readers.drives.headers import check_size, photograph_size
 from storage.readers.drives.instants import Instant, instants, with_absent
-from storage.readers.drives.lenses import panorama_views, pinhole_of
+from storage.readers.drives.lenses import fitted_lens, panorama_views, pinhole_of
 from storage.readers.drives.naming import by_number
 from storage.readers.drives.recordings import (
     PANORAMA,
@@ -93,7 +93,7 @@ def _drive(recording: Recording) -> Drive:
     pinholes = [pinhole_of(lens) for lens in firsts]
     sizes = np.array([(width, height) for _, width, height in pinholes])
     present = np.array([[frame is not None for frame in row] for row in photographs])
-    told = _notes(names, frames, moments, lenses, sizes)
+    told = _notes(names, frames, moments, lenses, sizes) + _shrunk(names, photographs, lenses)
     return Drive(
         file=file,
         cameras=tuple(names),
@@ -211,10 +211,33 @@ def _checked_lenses(
             size = photograph_size(frame.photograph)
             nothing = (np.nan,) * 4
             lens = frame.lens or Lens(PINHOLE, *size, *nothing)
-            check_size(frame.photograph, size, (lens.w, lens.h))
-            lenses.append(lens)
+            lenses.append(fitted_lens(frame.photograph, lens, size))
         rows.append(tuple(lenses))
     return tuple(rows)
+
+
+def _shrunk(
+    names: Sequence[str],
+    photographs: Sequence[Sequence[Frame | None]],
+    lenses: Sequence[Sequence[Lens | None]],
+) -> list[str]:
+    """What is to be said of cameras whose lenses were scaled; that is all photographs or none."""
+    notes = []
+    columns = zip(names, zip(*photographs, strict=True), zip(*lenses, strict=True), strict=True)
+    for name, frames, own in columns:
+        pairs = [(frame, lens) for frame, lens in zip(frames, own, strict=True) if frame and lens]
+        other = [(frame, lens) for frame, lens in pairs if frame.lens and frame.lens.w != lens.w]
+        if not other:
+            continue
+        frame, lens = other[0]
+        if len(other) < len(pairs) or len({(own.w, own.h) for _, own in pairs}) > 1:
+            said = frame.lens or lens
+            check_size(frame.photograph, (lens.w, lens.h), (said.w, said.h))
+        notes.append(
+            f"The photographs of camera {shortened(name, 40)} have {lens.w} x {lens.h} pixels, "
+            "not those of its lens: that is scaled."
+        )
+    return notes
 
 
 def _notes(

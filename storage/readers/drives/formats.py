@@ -41,8 +41,8 @@ class Format(NamedTuple):
 
 FORMATS = (
     Format(
-        "nerfstudio, instant-ngp",
-        "transforms.json",
+        "nerfstudio, instant-ngp, Blender",
+        "transforms.json or transforms_train.json",
         "All of their forms; pinholes with or without distortion, fisheyes, equirectangular "
         "pictures, masks; camera and time by fields of their own or by the files' names.",
         find_transforms,

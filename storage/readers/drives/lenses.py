@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from storage.readers.drives.headers import check_size
 from storage.readers.drives.recordings import FISHEYE, PANORAMA, PINHOLE, Frame, Lens
 
 AZIMUTHS = (0, 90, 180, 270)
@@ -22,6 +24,20 @@ def pinhole_of(lens: Lens) -> tuple[NDArray[np.float64], int, int]:
         middle = (side - 1) / 2
         return np.array([[side / 2, 0, middle], [0, side / 2, middle], [0, 0, 1]]), side, side
     return np.array([[lens.fl_x, 0, lens.cx], [0, lens.fl_y, lens.cy], [0, 0, 1]]), lens.w, lens.h
+
+
+def fitted_lens(photograph: Path, lens: Lens, size: tuple[int, int]) -> Lens:
+    """The lens of a photograph of another ``size`` (width, height) than it says: scaled, where the
+    shape is the same to a pixel. Raises BadInput for another shape."""
+    if size == (lens.w, lens.h):
+        return lens
+    cut = size[0] == lens.w or size[1] == lens.h
+    if cut or abs(size[0] * lens.h - size[1] * lens.w) > max(lens.w, lens.h):
+        check_size(photograph, size, (lens.w, lens.h))
+    across, down = size[0] / lens.w, size[1] / lens.h
+    centre = (lens.cx + 0.5) * across - 0.5, (lens.cy + 0.5) * down - 0.5
+    focal = lens.fl_x * across, lens.fl_y * down
+    return Lens(lens.model, *size, *focal, *centre, lens.coefficients, lens.azimuth)
 
 
 def panorama_views(frame: Frame) -> list[Frame]:
@@ -92,14 +108,14 @@ def _places(
 def _panorama_places(
     lens: Lens, intrinsics: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    rows, columns = np.mgrid[:height, :width].astype(np.float64)
-    right = (columns - intrinsics[0, 2]) / intrinsics[0, 0]
-    below = (rows - intrinsics[1, 2]) / intrinsics[1, 1]
+    right = (np.arange(width) - intrinsics[0, 2]) / intrinsics[0, 0]
+    below = (np.arange(height) - intrinsics[1, 2]) / intrinsics[1, 1]
     longitude = np.arctan(right) + np.radians(lens.azimuth)
-    latitude = np.arctan2(below, np.hypot(right, 1))
+    latitude = np.arctan2(below[:, None], np.hypot(right, 1))
     across = (longitude / (2 * np.pi) + 0.5) * lens.w - 0.5
     down = (latitude / np.pi + 0.5) * lens.h - 0.5
-    return across.astype(np.float32), down.astype(np.float32)
+    across = np.broadcast_to(across.astype(np.float32), (height, width))
+    return np.ascontiguousarray(across), down.astype(np.float32)
 
 
 def _to_the_right(azimuth: float) -> NDArray[np.float64]:

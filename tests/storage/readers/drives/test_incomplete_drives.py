@@ -175,6 +175,33 @@ def test_a_lens_that_changes_is_evened_out(tmp_path: Path) -> None:
     assert "The lens of right changes" in said(drive)
 
 
+def test_photographs_that_somebody_shrank_have_their_lens_shrunk(tmp_path: Path) -> None:
+    path = written(tmp_path / "drive")
+    half = [row[1].reshape(HEIGHT // 2, 2, WIDTH // 2, 2, 3).mean(axis=(1, 3)).astype(np.uint8)
+            for row in true_pictures()]  # fmt: skip
+    for instant, picture in enumerate(half):
+        save(path / f"right_{instant}.png", picture)
+    drive = read_drive(path)
+    np.testing.assert_array_equal(drive.sizes, [[WIDTH, HEIGHT], [WIDTH // 2, HEIGHT // 2]])
+    np.testing.assert_array_equal(read_frame(drive, 4)[1, : HEIGHT // 2, : WIDTH // 2], half[4])
+    # A ray through the corner where four pixels meet goes through the middle of the small one.
+    for k, pixel in ((K, [10.5, 20.5, 1]), (drive.intrinsics[1], [5, 10, 1])):
+        np.testing.assert_allclose(np.linalg.inv(k) @ pixel, np.linalg.inv(K) @ [10.5, 20.5, 1])
+    assert "photographs of camera right have 24 x 16 pixels" in said(drive)
+    # But one alone is an error, and so is another shape.
+    save(path / "right_3.png", true_pictures()[3][1])
+    with pytest.raises(BadInput, match=r"right_\d.png: size is 24 x 16 pixels; expected 48 x 32"):
+        read_drive(path)
+    for instant in range(6):
+        save(path / f"right_{instant}.png", true_pictures()[instant][1][:-1])
+    with pytest.raises(BadInput, match="size is 48 x 31 pixels; expected 48 x 32"):
+        read_drive(path)
+    for instant in range(6):
+        save(path / f"right_{instant}.png", half[instant][:-2])
+    with pytest.raises(BadInput, match="size is 24 x 14 pixels; expected 48 x 32"):
+        read_drive(path)
+
+
 def test_masks(tmp_path: Path) -> None:
     def change(top: Any) -> None:
         top["frames"][4]["mask_path"] = "masks\\left_2"
