@@ -202,7 +202,10 @@ def kitti_frames(folder: Path) -> DriveFrames:
             centred_intrinsics,
         )
 
-        pixels = cv2.cvtColor(cv2.imread(str(files[frame])), cv2.COLOR_BGR2RGB)[None]
+        grey = cv2.imread(str(files[frame]), cv2.IMREAD_GRAYSCALE)
+        if grey is None:
+            raise ValueError(f"{files[frame]}: no picture; expected a photograph of the drive.")
+        pixels = np.repeat(np.asarray(grey, np.uint8)[None, ..., None], 3, axis=-1)
         height, width = pixels.shape[1:3]
         own = centred_intrinsics(lens, width, height)
         return RigFrame(centre_photographs(pixels, lens[None]), own[None], poses[frame, None])

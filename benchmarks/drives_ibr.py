@@ -97,7 +97,8 @@ def _looked_up(one: DepthPhotograph, places: FloatArray) -> tuple[FloatArray, ND
     inside = (away > 0.3) & (pixels >= 0).all(axis=-1)
     inside &= (pixels[..., 0] <= width - 1) & (pixels[..., 1] <= height - 1)
     at = np.where(inside[..., None], pixels, 0).astype(np.float32)
-    colours = cv2.remap(one.pixels, at[..., 0], at[..., 1], cv2.INTER_CUBIC).astype(np.float64)
+    looked = cv2.remap(one.pixels, at[..., 0], at[..., 1], cv2.INTER_CUBIC)
+    colours = np.asarray(looked, np.float64)
     seen = cv2.remap(one.depth, at[..., 0], at[..., 1], cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):
         sees = inside & ~(away > (1 + _SAME) * seen)
