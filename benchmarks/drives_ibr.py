@@ -55,12 +55,8 @@ def rendered(
     mean = total / np.maximum(weights, 1e-12)[..., None]
     blind = weights == 0
     if blind.any():
-        mean = cv2.inpaint(
-            np.clip(np.rint(mean), 0, 255).astype(np.uint8),
-            blind.astype(np.uint8),
-            3,
-            cv2.INPAINT_TELEA,
-        )
+        codes = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
+        mean = np.asarray(cv2.inpaint(codes, blind.astype(np.uint8), 3, cv2.INPAINT_TELEA), float)
     return np.clip(np.rint(mean), 0, 255).astype(np.uint8)
 
 
