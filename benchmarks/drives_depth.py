@@ -40,7 +40,9 @@ _ROAD_HALF = 3.5
 _AROUND = 3
 
 
-class _Photographed(NamedTuple):
+class Photographed(NamedTuple):
+    """A drive of one camera with the depth of each frame."""
+
     frames: DriveFrames
     truth: Map
     """(f, h, w), inf in the sky."""
@@ -52,7 +54,7 @@ def run() -> dict[str, Any]:
     return depth_figures(city) | moving_figures(city) | _seconds() | _memory() | _drop()
 
 
-def simulated(frames: int, width: int, height: int, angle: float) -> _Photographed:
+def simulated(frames: int, width: int, height: int, angle: float) -> Photographed:
     """The simulated city from one camera, every third metre, with what is true in each frame."""
     from pipelines.virtual.city.city import make_city
     from pipelines.virtual.city.drive import expose_photograph, plan_drive
@@ -72,13 +74,13 @@ def simulated(frames: int, width: int, height: int, angle: float) -> _Photograph
         return RigFrame(shown[frame], drive.intrinsics, drive.poses[frame])
 
     taken = np.flatnonzero(~held_out(frames))
-    return _Photographed(DriveFrames(load, drive.poses, taken), np.array(truth, np.float32))
+    return Photographed(DriveFrames(load, drive.poses, taken), np.array(truth, np.float32))
 
 
 # ---- the simulated city ----------------------------------------------------------------------
 
 
-def depth_figures(city: _Photographed) -> dict[str, float]:
+def depth_figures(city: Photographed) -> dict[str, float]:
     """How much is known, how much of it is bad, and whether deviations say so; with nulls."""
     found = DriveDepth(city.frames, nearest=NEAREST, farthest=FARTHEST)
     asked = range(1, len(city.truth) - 1)
@@ -112,7 +114,7 @@ def road_and_distance(frame: RigFrame) -> Map:
     return np.where(aside < _ROAD_HALF, depth, _BESIDE_ROAD).astype(np.float32)
 
 
-def moving_figures(city: _Photographed) -> dict[str, float]:
+def moving_figures(city: Photographed) -> dict[str, float]:
     """Share of what overtakes that has a depth; and of what is there without it."""
     boxes: dict[int, tuple[slice, slice]] = {}
     picture = np.random.default_rng(5).integers(0, 255, (40, 60, 3), np.uint8)
