@@ -55,12 +55,8 @@ def rendered(
     mean = total / np.maximum(weights, 1e-12)[..., None]
     blind = weights == 0
     if blind.any():
-        mean = cv2.inpaint(
-            np.clip(np.rint(mean), 0, 255).astype(np.uint8),
-            blind.astype(np.uint8),
-            3,
-            cv2.INPAINT_TELEA,
-        )
+        codes = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
+        mean = np.asarray(cv2.inpaint(codes, blind.astype(np.uint8), 3, cv2.INPAINT_TELEA), float)
     return np.clip(np.rint(mean), 0, 255).astype(np.uint8)
 
 
@@ -97,7 +93,8 @@ def _looked_up(one: DepthPhotograph, places: FloatArray) -> tuple[FloatArray, ND
     inside = (away > 0.3) & (pixels >= 0).all(axis=-1)
     inside &= (pixels[..., 0] <= width - 1) & (pixels[..., 1] <= height - 1)
     at = np.where(inside[..., None], pixels, 0).astype(np.float32)
-    colours = cv2.remap(one.pixels, at[..., 0], at[..., 1], cv2.INTER_CUBIC).astype(np.float64)
+    looked = cv2.remap(one.pixels, at[..., 0], at[..., 1], cv2.INTER_CUBIC)
+    colours = np.asarray(looked, np.float64)
     seen = cv2.remap(one.depth, at[..., 0], at[..., 1], cv2.INTER_NEAREST)
     with np.errstate(invalid="ignore"):
         sees = inside & ~(away > (1 + _SAME) * seen)

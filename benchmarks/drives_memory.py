@@ -1,6 +1,6 @@
 """Peak of memory of one camera's depth over a drive: ``python -m benchmarks.drives_memory FRAMES``.
 
-Small photographs of noise, made when they are asked for; nothing is kept of what is found.
+Photographs of noise, made when they are asked for; nothing is kept of what is found.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 
 from pipelines.street_billboards.capture.drive_depth import DriveDepth, DriveFrames, RigFrame
 
-_WIDTH, _HEIGHT = 256, 64
+_WIDTH, _HEIGHT = 640, 400
 
 
 def peak(frames: int) -> float:
     """Megabytes."""
-    lens = np.array([[128.0, 0, 127.5], [0, 128.0, 31.5], [0, 0, 1]])[None]
+    lens = np.array([[400.0, 0, 319.5], [0, 400, 199.5], [0, 0, 1]])[None]
     poses = np.tile(np.eye(4), (frames, 1, 1, 1))
     poses[:, 0, 2, 3] = np.arange(frames)
 

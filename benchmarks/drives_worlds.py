@@ -63,7 +63,7 @@ def run() -> dict[str, Any]:
             count += 1
             good = _is_right(case, truth, stars)
             right += good
-            null += case.refused is None and _fits(_as_given(case), case, truth)
+            null += case.refused is None and fits(as_given(case), case, truth)
             if not good:
                 wrong.append(f"{len(truth.intrinsics)}: {case.name}")
     return {
@@ -88,7 +88,9 @@ def photographed() -> Drive:
     with CityStage(make_city(FRAMES * SPACING, 0), street_photographs(), WIDTH, HEIGHT) as stage:
         for place in np.ndindex(FRAMES, 3):
             light = stage.shoot(drive.intrinsics[place[1]], drive.poses[place]).radiance
-            shown[place] = expose_photograph(light, drive.gains[place], EXPOSURE, 0.004, random)
+            shown[place] = expose_photograph(
+                light, float(drive.gains[place]), EXPOSURE, 0.004, random
+            )
     return Drive(shown, drive.poses, drive.intrinsics)
 
 
@@ -108,11 +110,11 @@ def rig_cases(rig: Drive) -> list[Case]:
         *(_posed(f"up is {name}", rig, turn @ poses) for name, turn in _turns().items()),
         _posed("OpenGL, y up", rig, _turns()["y"] @ poses @ OPENGL),
         _posed("OpenGL, feet", rig, scaled(poses @ OPENGL, 1 / 0.3048)),
-        _posed("inverse, millimetres", rig, np.linalg.inv(scaled(poses, 1000.0))),
+        _posed("inverse, millimetres", rig, inverse(scaled(poses, 1000.0))),
         _posed("mirrored, centimetres", rig, scaled(mirrored(poses, 1), 100.0)),
-        _posed("inverse of OpenGL's", rig, np.linalg.inv(poses @ OPENGL)),
+        _posed("inverse of OpenGL's", rig, inverse(poses @ OPENGL)),
         *(_zoomed(rig, factor) for factor in (0.9, 0.95, 1.05, 1.1)),
-        _zoomed(rig._replace(poses=poses @ OPENGL), 1.1),
+        _zoomed(rig._replace(poses=poses @ OPENGL), 1.1, "OpenGL, "),
         Case(
             "in any order",
             Drive(rig.photographs[shuffled], poses[shuffled], rig.intrinsics),
@@ -162,7 +164,7 @@ def _both(drive: Drive) -> list[Case]:
     return [
         Case("as it is", drive),
         _posed("OpenGL", drive, poses @ OPENGL),
-        _posed("inverse", drive, np.linalg.inv(poses)),
+        _posed("inverse", drive, inverse(poses)),
         _posed("reversed", drive, poses[::-1].copy()),
         *(_posed(f"mirrored {'xyz'[axis]}", drive, mirrored(poses, axis)) for axis in range(3)),
         *(_posed(f"times {unit:g}", drive, scaled(poses, unit)) for unit in (1000.0, 100.0, 0.31)),
@@ -174,10 +176,15 @@ def _posed(name: str, drive: Drive, poses: FloatArray, refused: str | None = Non
     return Case(name, drive._replace(poses=poses), refused)
 
 
-def _zoomed(drive: Drive, factor: float) -> Case:
+def _zoomed(drive: Drive, factor: float, more: str = "") -> Case:
     lens = drive.intrinsics.copy()
     lens[:, (0, 1), (0, 1)] *= factor
-    return Case(f"focal length times {factor:g}", drive._replace(intrinsics=lens))
+    return Case(f"{more}focal length times {factor:g}", drive._replace(intrinsics=lens))
+
+
+def inverse(poses: FloatArray) -> FloatArray:
+    """World to camera instead of camera to world."""
+    return np.asarray(np.linalg.inv(poses), np.float64)
 
 
 def scaled(poses: FloatArray, factor: float) -> FloatArray:
@@ -237,7 +244,7 @@ def _is_right(case: Case, truth: Drive, stars: list[Star]) -> bool:
         found = _read(case.drive, truth, stars)
     except ValueError as error:
         return case.refused is not None and re.search(case.refused, str(error)) is not None
-    return case.refused is None and _fits(found, case, truth)
+    return case.refused is None and fits(found, case, truth)
 
 
 def _read(drive: Drive, truth: Drive, stars: list[Star]) -> World:
@@ -253,12 +260,12 @@ def _read(drive: Drive, truth: Drive, stars: list[Star]) -> World:
     return read_world(stars, drive.poses, drive.intrinsics, camera_height=CAMERA_HEIGHT)
 
 
-def _as_given(case: Case) -> World:
+def as_given(case: Case) -> World:
     """What is there if nothing is done."""
     return World(case.drive.poses, case.drive.intrinsics, np.arange(FRAMES), ())
 
 
-def _fits(found: World, case: Case, truth: Drive) -> bool:
+def fits(found: World, case: Case, truth: Drive) -> bool:
     """Whether a world is the true one but for its zero and the direction of its x."""
     poses = truth.poses[case.frames[found.order]]
     ours, theirs = (np.linalg.inv(some[0, 0]) @ some for some in (found.poses, poses))

@@ -3,10 +3,12 @@
 Sections and equations named in this package are those of the paper that the page cites. In the
 order of the method:
 
-1. ``capture``: a drive's photographs become depths (``stereo``), what neighbouring frames confirm
-   becomes points (``multi_view_consistency``, ``point_fusion``), these tell exposures
-   (``observations``, ``exposure``); ``sky`` is behind. ``drive_depth``, ``drive_points``: whole
-   drives, frames loaded as they come.
+0. ``poses``: where the photographs were taken, and in which world (``worlds``).
+1. ``capture``: a drive's photographs become depths (``stereo`` of cameras in a row, ``plane_sweep``
+   along the road of one), what neighbouring frames confirm becomes points
+   (``multi_view_consistency``, ``point_fusion``), these tell exposures (``observations``,
+   ``exposure``); ``sky`` is behind. ``drive_depth``, ``drive_points``: whole drives, frames loaded
+   as they come.
 2. ``octree`` splits space into voxels, ``billboards`` lays a rectangle through the points of each
    (4.1: ``octree_leaves``, ``fit_billboards``); ``road_tiles`` puts them in the road's order.
 3. ``textures``: photographs sampled from each direction (4.2.1: ``view_textures``), made small

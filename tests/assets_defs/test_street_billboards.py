@@ -18,7 +18,7 @@ from assets_defs.street_billboards.datasets import compressed_of, pages_of, view
 from assets_defs.street_billboards.graph import STREET
 from pipelines.geometry.cameras import moved_left
 from pipelines.street_billboards import billboards, figures, live_tiles, octree
-from pipelines.street_billboards.capture import exposure, plane_sweep, point_fusion, stereo
+from pipelines.street_billboards.capture import drive_depth, exposure, point_fusion, stereo
 from pipelines.street_billboards.drawing import culling, processor_street, quads, street_stage
 from pipelines.street_billboards.frames import draw_view
 from pipelines.street_billboards.street_model import StreetModel
@@ -110,7 +110,7 @@ def test_a_drive_of_one_camera_goes_through_the_whole_graph(make_house: Any) -> 
     np.testing.assert_array_equal(frames["truth"].values[0], drive["photographs"].values[held, 0])
     for check, wrong in (("depth_error", _swept_deeper), ("deviation_honest", _swept_too_surely)):
         with pytest.MonkeyPatch.context() as patch:
-            regression = Regression(check, plane_sweep, "sweep_depth", wrong, KEYS)
+            regression = Regression(check, drive_depth, "sweep_depth", wrong, KEYS)
             assert_check_finds(house, STREET, regression, patch)
 
 

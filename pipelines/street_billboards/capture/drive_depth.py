@@ -1,29 +1,34 @@
 """Depth maps of a whole drive, frame by frame, before the sky that is behind all of them.
 
-Of one camera by ``plane_sweep`` along the road: what the frames beside it do not confirm is
-unknown, so what moves on its own has no depth. Of a rig by ``stereo`` of its neighbours.
+Of cameras in a row by ``stereo`` of neighbours. Of one camera, or of several that look different
+ways, by ``plane_sweep`` along the road, each on its own: what the frames beside it do not confirm
+is unknown, so what moves on its own has no depth. Cameras in a row have stereo alone: together with
+the sweep as many pixels are known, as many of them bad, at three times the work.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from itertools import pairwise
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.capture import plane_sweep, stereo
+from pipelines.street_billboards.capture import stereo
 from pipelines.street_billboards.capture.multi_view_consistency import (
     DepthView,
     OtherDepthViews,
     confirmed_depth,
 )
+from pipelines.street_billboards.capture.plane_sweep import Photograph, SweptDepth, sweep_depth
 from pipelines.street_billboards.capture.sky import SkyView, sky_map, sky_pixels
 from pipelines.street_billboards.capture.stereo import DepthMaps
 
 FloatArray = NDArray[np.float64]
+Map = NDArray[np.float32]
 
 Made = TypeVar("Made")
 
@@ -36,7 +41,9 @@ _SHORTEST = 80
 _CONFIRMED = 2
 """Frames that must have the same depth."""
 _KEPT = 4 * _BESIDE + 2
-"""Photographs' own depths that are kept: more than one frame and its neighbours ask for."""
+"""Frames whose photographs and own depths are kept: one and its neighbours ask for fewer."""
+_SAME_WAY = 25.0
+"""Degrees between what two neighbours look at that see the same."""
 
 
 class RigFrame(NamedTuple):
@@ -72,6 +79,7 @@ class DriveDepth:
     def __init__(self, frames: DriveFrames, *, nearest: float, farthest: float) -> None:
         self._frames = frames
         self._nearest, self._farthest = nearest, farthest
+        self._in_a_row = stand_in_a_row(frames.poses[0])
         self._loaded = _Kept(frames.load)
         self._swept = _Kept(self._sweep)
 
@@ -80,10 +88,12 @@ class DriveDepth:
 
         Raises ValueError as ``stereo.depth_maps`` does, and for a frame that has no others.
         """
-        if self._frames.poses.shape[1] > 1:
+        if self._in_a_row:
             shown = self._loaded(frame)
             return stereo.depth_maps(*shown, nearest=self._nearest, farthest=self._farthest)
-        return self._confirmed(frame)
+        cameras = range(self._frames.poses.shape[1])
+        found = [self._confirmed(frame, camera) for camera in cameras]
+        return DepthMaps._make(np.stack(maps) for maps in zip(*found, strict=True))
 
     def before_sky(self, frame: int) -> DepthMaps:
         """The same, inf where the pixels show the sky."""
@@ -99,30 +109,34 @@ class DriveDepth:
             views += sky_views(self._loaded(frame), self.maps(frame))
         return sky_map(views)
 
-    def _sweep(self, frame: int) -> DepthMaps:
-        """Of the one camera, as its photographs along the road have it."""
-        found = plane_sweep.sweep_depth(
-            _photograph(self._loaded(frame)),
-            [_photograph(self._loaded(one)) for one in self._beside(frame)],
-            nearest=self._nearest,
-            farthest=self._farthest,
-        )
-        return DepthMaps(found.depth[None], found.deviation[None])
+    def _sweep(self, frame: int) -> list[SweptDepth]:
+        """Of each camera, as its photographs along the road have it."""
+        shown = self._loaded(frame)
+        others = [self._loaded(one) for one in self._beside(frame)]
+        return [
+            sweep_depth(
+                _photograph(shown, camera),
+                [_photograph(one, camera) for one in others],
+                nearest=self._nearest,
+                farthest=self._farthest,
+            )
+            for camera in range(len(shown.poses))
+        ]
 
-    def _confirmed(self, frame: int) -> DepthMaps:
-        """What the frames beside it have, too."""
-        own, others = self._swept(frame), self._beside(frame)
-        maps = list(map(self._swept, others))
-        poses, lens = self._frames.poses[:, 0], _lens(self._loaded(frame))
-        view = DepthView(own.depth[0], own.deviation[0], lens, np.ascontiguousarray(poses[frame]))
+    def _confirmed(self, frame: int, camera: int) -> tuple[Map, Map]:
+        """What the camera's frames beside it have, too: depth and deviation (y, x)."""
+        own, others = self._swept(frame)[camera], self._beside(frame)
+        maps = [self._swept(one)[camera] for one in others]
+        poses = self._frames.poses[:, camera]
+        lens = _lens(self._loaded(frame), camera)
+        view = DepthView(own.depth, own.deviation, lens, np.ascontiguousarray(poses[frame]))
         asked = OtherDepthViews(
-            np.concatenate([one.depth for one in maps]),
-            np.concatenate([one.deviation for one in maps]),
-            np.stack([_lens(self._loaded(one)) for one in others]),
+            np.stack([one.depth for one in maps]),
+            np.stack([one.deviation for one in maps]),
+            np.stack([_lens(self._loaded(one), camera) for one in others]),
             np.asarray(np.linalg.inv(poses[others]), np.float64),
         )
-        depth, deviation = confirmed_depth(view, asked, min(_CONFIRMED, len(others)))
-        return DepthMaps(depth[None], deviation[None])
+        return confirmed_depth(view, asked, min(_CONFIRMED, len(others)))
 
     def _beside(self, frame: int) -> list[int]:
         places = self._frames.poses[:, 0, :3, 3]
@@ -184,12 +198,28 @@ def frames_beside(
     return found
 
 
-def _photograph(frame: RigFrame) -> plane_sweep.Photograph:
-    return plane_sweep.Photograph(frame.photographs[0], frame.intrinsics[0], frame.poses[0])
+def stand_in_a_row(poses: FloatArray) -> bool:
+    """Whether each of c cameras (c, 4, 4) stands beside the next and looks the same way.
+
+    >>> pair = np.stack([np.eye(4), np.eye(4)])
+    >>> pair[1, 0, 3] = 0.5
+    >>> stand_in_a_row(pair), stand_in_a_row(pair[:1])
+    (True, False)
+    """
+    for one, other in pairwise(poses):
+        way = np.linalg.inv(one) @ other
+        apart = float(np.linalg.norm(way[:3, 3]))
+        if not abs(way[0, 3]) > 0.5 * apart or way[2, 2] < np.cos(np.radians(_SAME_WAY)):
+            return False
+    return len(poses) > 1
 
 
-def _lens(frame: RigFrame) -> FloatArray:
-    k = frame.intrinsics[0]
+def _photograph(frame: RigFrame, camera: int) -> Photograph:
+    return Photograph(*(values[camera] for values in frame))
+
+
+def _lens(frame: RigFrame, camera: int) -> FloatArray:
+    k = frame.intrinsics[camera]
     return np.array([k[0, 0], k[1, 1], k[0, 2], k[1, 2]], np.float64)
 
 

@@ -49,11 +49,11 @@ def find_road(
     for star in stars:
         found = sights(star, poses, intrinsics)
         frame, camera = star.view
-        exact = np.nanmedian(found.residual, axis=1) < _EXACT if len(star.pixels) else []
+        exact = np.nanmedian(found.residual, axis=1) < _EXACT
         rays = np.concatenate([star.pixels, np.ones((len(star.pixels), 1))], axis=1)
         rays = rays @ np.linalg.inv(intrinsics[camera]).T
         low = (rays[:, 1] > _STEEP) & (np.abs(rays[:, 0]) < _ASIDE * rays[:, 1])
-        kept = np.asarray(exact, bool) & low & (found.inverse_depth > 0)
+        kept = exact & low & (found.inverse_depth > 0)
         points = rays[kept] / found.inverse_depth[kept, None]
         below.append(points @ poses[frame, camera, :3, :3].T)
         ups.append(-poses[frame, camera, :3, 1])

@@ -8,15 +8,18 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from pipelines.street_billboards.capture import drive_depth
 from pipelines.street_billboards.capture.drive_depth import (
     DriveDepth,
     DriveFrames,
     RigFrame,
     frames_beside,
+    stand_in_a_row,
 )
+from pipelines.street_billboards.capture.plane_sweep import Photograph
 from pipelines.street_billboards.capture.sky import SkyView, sky_map
 from pipelines.street_billboards.capture.stereo import depth_maps
-from tests.pipelines.street_billboards.stereo_street import frame_at
+from tests.pipelines.street_billboards.stereo_street import frame_at, turned
 
 REACH = {"nearest": 2.0, "farthest": 40.0}
 SPACING = 1.0
@@ -97,6 +100,28 @@ def test_one_camera_finds_depth_along_the_road() -> None:
     assert np.isinf(depth[np.isfinite(truth)]).mean() < 0.02
 
 
+def test_cameras_that_look_different_ways_have_their_depth_along_the_road() -> None:
+    """Two cameras at one place, the second turned away: each has what it would have alone."""
+    frames = [_alone(number) for number in range(5)]
+    turn = np.eye(4)
+    turn[:3, :3] = turned(0, 40, 0)
+    pairs = [
+        RigFrame(
+            np.concatenate([one.photographs, one.photographs[:, :, ::-1]]),
+            np.concatenate([one.intrinsics] * 2),
+            np.concatenate([one.poses, one.poses @ turn]),
+        )
+        for one in frames
+    ]
+    assert not stand_in_a_row(pairs[0].poses)
+    assert not stand_in_a_row(frames[0].poses)
+    assert stand_in_a_row(_frame().poses)
+    found = DriveDepth(_drive(pairs), **REACH).maps(2)
+    alone = DriveDepth(_drive(frames), **REACH).maps(2)
+    assert found.depth.shape == (2, 200, 320)
+    np.testing.assert_array_equal(found.depth[:1], alone.depth)
+
+
 def test_what_drives_along_has_no_depth() -> None:
     """A box that overtakes: it is larger in each photograph before, and comes from behind."""
     still = [_alone(number) for number in range(7)]
@@ -136,16 +161,14 @@ def test_frames_held_out_are_not_looked_at_and_have_depth_all_the_same() -> None
 def test_each_photograph_is_swept_once_whoever_asks_at_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from pipelines.street_billboards.capture import plane_sweep
+    swept, lock, right = [], threading.Lock(), drive_depth.sweep_depth
 
-    swept, lock, right = [], threading.Lock(), plane_sweep.sweep_depth
-
-    def counted(photograph: plane_sweep.Photograph, *others: object, **reach: float) -> object:
+    def counted(photograph: Photograph, *others: object, **reach: float) -> object:
         with lock:
             swept.append(float(photograph.pose[1, 3]))
         return right(photograph, *others, **reach)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plane_sweep, "sweep_depth", counted)
+    monkeypatch.setattr(drive_depth, "sweep_depth", counted)
     frames = [_alone(number) for number in range(7)]
     depth = DriveDepth(_drive(frames), **REACH)
     with ThreadPoolExecutor(4) as threads:

@@ -7,6 +7,7 @@ import pytest
 
 from pipelines.street_billboards.capture.drive_agreement import (
     LEAST_AGREEMENT,
+    frames_compared,
     neighbours_agreement,
 )
 from pipelines.street_billboards.capture.drive_depth import RigFrame
@@ -23,7 +24,7 @@ from pipelines.street_billboards.capture.point_fusion import (
     photometric_agreement,
 )
 from pipelines.street_billboards.capture.stereo import depth_maps
-from tests.pipelines.street_billboards.stereo_street import distances_to_street, frame_at
+from tests.pipelines.street_billboards.stereo_street import distances_to_street, frame_at, turned
 
 PLACES = (0.0, 3.0, 6.0)
 EXPOSURES = (1.0, 1.15, 0.9)
@@ -108,6 +109,25 @@ def test_gains_are_the_exposures_of_each_camera(views: list[RgbdViews]) -> None:
     relative = found / found.mean(axis=1, keepdims=True)
     expected = np.array(EXPOSURES) / np.mean(EXPOSURES)
     np.testing.assert_allclose(relative, np.tile(expected[:, None], (2, 1, 3)), atol=0.03)
+
+
+def test_one_cameras_frames_agree_where_their_poses_are_right() -> None:
+    frames = [
+        RigFrame(frame.photographs[1:2], frame.intrinsics[1:2], frame.poses[1:2])
+        for frame in (frame_at(1.5 * number) for number in range(frames_compared(1)))
+    ]
+    assert neighbours_agreement(frames) > 0.6
+    swapped = [
+        one._replace(poses=frames[other].poses)
+        for one, other in zip(frames, (0, 3, 1, 4, 2), strict=True)
+    ]
+    assert neighbours_agreement(swapped) < LEAST_AGREEMENT
+    shaken = []
+    for number, frame in enumerate(frames):
+        turn = np.eye(4)
+        turn[:3, :3] = turned(0, 3.0 * (-1) ** number, 0)
+        shaken.append(frame._replace(poses=frame.poses @ turn))
+    assert neighbours_agreement(shaken) < LEAST_AGREEMENT
 
 
 def test_frames_of_one_world_agree_and_of_another_do_not() -> None:
