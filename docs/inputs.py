@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from storage.readers.drives.formats import FORMATS
+from storage.readers.drives.formats import FORMATS, UNPOSED
 
 PAGE = Path(__file__).parent / "inputs.md"
 RESULTS = Path("benchmarks") / "results" / "captures.json"
@@ -74,7 +74,10 @@ def _drives() -> list[str]:
         "",
         "| format | known by | what is read |",
         "|---|---|---|",
-        *(f"| {known.name} | `{known.known_by}` | {known.sentence} |" for known in FORMATS),
+        *(
+            f"| {known.name} | `{known.known_by}` | {known.sentence} |"
+            for known in (*FORMATS, *UNPOSED)
+        ),
     ]
 
 
