@@ -121,7 +121,7 @@ def _guess(file: Path, focal: float) -> None:
 
     with pycolmap.Database.open(file) as database:
         (lens,) = database.read_all_cameras()
-        lens.params = np.array([focal, *lens.params[1:]])
+        lens.params = [focal, *lens.params[1:]]
         database.update_camera(lens)
 
 
