@@ -17,6 +17,9 @@ order of the method:
 4. ``drawing``: the street on the stage (``shader_street``, ``street_stage``); ``frames``: all
    pictures of a drive.
 
+``poses`` comes before them where a drive has none: found in a film, or adjusted (``found_poses``,
+``adjusted_poses``).
+
 ``whole_street`` does steps 1 to 3 on photographs in memory by one call; ``figures`` tells whether
 results are right.
 """

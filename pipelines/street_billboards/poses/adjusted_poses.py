@@ -34,6 +34,8 @@ NEIGHBOURS = 4
 """Frames before that each camera's picture is matched with."""
 _ROUNDS = (12.0, 4.0, 2.0)
 """Pixels that sightings may be off, before each adjustment."""
+_MOST_MOVED = 3
+"""Times the noise of the given poses that they may be moved, root mean square."""
 _FEWEST = 30
 """Points of a frame, below which its pose is left as it was given."""
 
@@ -71,7 +73,8 @@ def adjust_poses(
     poses (f, c, 4, 4), camera to world; intrinsics (c, 3, 3); mask (h, w): False where nothing of
     the world is seen; noise: standard deviations of the given poses, metres and radians. The rig is
     the mean of what the given poses say of it, and rigid. Raises ValueError where the photographs
-    have too few points in common, which wrong poses or a wrong focal length make, too.
+    have too few points in common that the poses allow, and where what they show would move the
+    poses by more than three times their noise: the poses or the focal length are wrong.
     """
     rig, path = mean_rig(poses)
     matches, pictures = _matched(frames, mask, len(rig), progress)
@@ -90,7 +93,9 @@ def adjust_poses(
             before = _median_residual(fitting, seen)
         adjusted = adjust_bundle(fitting._replace(poses=path), seen, _priors(noise))
         bundle = adjusted
-    return _result(poses, path, bundle, seen, before)
+    found = _result(path, bundle, seen, before)
+    _check_moved(found, noise)
+    return found
 
 
 def mean_rig(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -160,9 +165,18 @@ def _median_residual(bundle: Bundle, seen: Sightings) -> float:
     return float(np.median(np.linalg.norm(residuals(bundle, seen)[0], axis=1)))
 
 
-def _result(
-    given: FloatArray, path: FloatArray, bundle: Bundle, seen: Sightings, before: float
-) -> AdjustedPoses:
+def _check_moved(found: AdjustedPoses, noise: tuple[float, float]) -> None:
+    moved, turned = (float(np.sqrt(np.mean(off**2))) for off in (found.moved, found.turned))
+    if moved > _MOST_MOVED * noise[0] or turned > _MOST_MOVED * noise[1]:
+        raise ValueError(
+            f"adjust: what is seen would move the given poses by {moved:.2f} m and "
+            f"{np.degrees(turned):.2f} degrees; expected at most {_MOST_MOVED} times their noise "
+            f"({noise[0]:g} m, {np.degrees(noise[1]):.2g} degrees): a wrong focal length, or poses "
+            "of other photographs."
+        )
+
+
+def _result(path: FloatArray, bundle: Bundle, seen: Sightings, before: float) -> AdjustedPoses:
     """Put back onto the given path as a whole."""
     frames = len(path)
     few = np.bincount(seen.frame, minlength=frames) < _FEWEST

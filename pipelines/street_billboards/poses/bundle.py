@@ -7,6 +7,7 @@ as one; poses and the focal length may have priors. ``focal_deviation`` uses the
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -242,7 +243,7 @@ def block_rows(blocks: FloatArray, rows: Any) -> Any:
 
 def sum_by(number: IntArray, values: FloatArray, count: int) -> FloatArray:
     """Sums (count, …) of values (m, …) of each number (m,)."""
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), math.prod(values.shape[1:]))
     sums = [np.bincount(number, column, count) for column in flat.T]
     return np.stack(sums, axis=1).astype(np.float64).reshape(count, *values.shape[1:])
 

@@ -8,7 +8,8 @@ points must be seen under angles that a road does not give. Both are allowed her
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,10 +29,8 @@ _LEAST_ANGLE = 0.7
 _ATTEMPTS = ((4.0, 1.0), (8.0, 0.8), (2.0, 1.25), (12.0, 1.0), (1.0, 0.9))
 """Degrees under which the first pair's points are seen at least, and a factor of the guessed focal
 length."""
-_ENOUGH = 0.95
-"""Share of frames with a pose, without which two attempts do not agree."""
 _AGREE = 0.03
-"""By how much sightings that fit may differ where two attempts found the same."""
+"""By how much sightings that fit, and frames with a pose, may differ where two attempts agree."""
 
 
 class Pinhole(NamedTuple):
@@ -108,7 +107,9 @@ def map_frames(file: Path, count: int, camera: Pinhole) -> Mapped | None:
         for model in models.values():
             found = _mapped(model)
             good = int((np.linalg.norm(residuals(found.bundle, found.seen)[0], axis=1) < 1).sum())
-            agree = abs(good - most) < _AGREE * most and len(found.frames) >= _ENOUGH * count
+            before = 0 if best is None else len(best.frames)
+            agree = abs(good - most) < _AGREE * most
+            agree &= abs(len(found.frames) - before) <= _AGREE * count
             if good > most:
                 best, most = found, good
             if agree:
@@ -121,7 +122,7 @@ def _guess(file: Path, focal: float) -> None:
 
     with pycolmap.Database.open(file) as database:
         (lens,) = database.read_all_cameras()
-        lens.params = np.array([focal, *lens.params[1:]])
+        lens.params = [focal, *lens.params[1:]]
         database.update_camera(lens)
 
 
@@ -207,16 +208,14 @@ def _mapped(model: Any) -> Mapped:
     return Mapped(np.array(images, np.int64) - 1, bundle, seen, np.array(feature, np.int64))
 
 
-class _quiet:  # noqa: N801 - used like contextlib's
+@contextmanager
+def _quiet() -> Iterator[None]:
     """COLMAP says only what is fatal."""
+    import pycolmap
 
-    def __enter__(self) -> None:
-        import pycolmap
-
-        self._before = pycolmap.logging.minloglevel
-        pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
-
-    def __exit__(self, *_: object) -> None:
-        import pycolmap
-
-        pycolmap.logging.minloglevel = self._before
+    before = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = before

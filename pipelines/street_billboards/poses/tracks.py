@@ -67,7 +67,7 @@ def triangulated(bundle: Bundle, seen: Sightings, count: int) -> FloatArray:
     rays = np.einsum("mij,mj->mi", poses[:, :3, :3], np.column_stack([flat, np.ones(len(flat))]))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-    origin = poses[0, :3, 3]  # small numbers stay exact far from zero
+    origin = bundle.poses[0, :3, 3]  # small numbers stay exact far from zero
     offset = np.einsum("mij,mj->mi", across, poses[:, :3, 3] - origin)
     normal = sum_by(seen.point, across, count)
     right = sum_by(seen.point, offset, count)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.geometry.cameras import moved_left, unproject_depth
 from pipelines.geometry.rays import build_scene, first_hits
+from pipelines.virtual.city.bend import STRAIGHT, Bend, bent_points, turned_vectors
 from pipelines.virtual.city.city import BEFORE, BEYOND, City, make_city
 from pipelines.virtual.city.drive import plan_drive
 from pipelines.virtual.city.light import sky_visibility
@@ -179,8 +180,45 @@ def test_repeatable_pictures_have_no_seam(photographs: Photographs) -> None:
 # ---- pictures ----------------------------------------------------------------------------------
 
 
-def test_depth_and_poles_are_those_of_rays(short: City, photographs: Photographs) -> None:
-    drive = plan_drive(4, 3.0, WIDTH, HEIGHT)
+def _bent(city: City, bend: Bend) -> City:
+    """The city made with a bend, but for its light."""
+    along = city.vertices[:, 0]
+    return city._replace(
+        vertices=bent_points(city.vertices, bend).astype(np.float32),
+        normals=turned_vectors(city.normals, along, bend).astype(np.float32),
+        bend=bend,
+    )
+
+
+def test_a_bent_city_is_the_straight_one_bent(short: City) -> None:
+    bend = Bend(2.0, 10.0, 0.3)
+    made, expected = make_city(12.0, 5, bend), _bent(short, bend)
+    np.testing.assert_array_equal(made.vertices, expected.vertices)
+    np.testing.assert_array_equal(made.normals, expected.normals)
+    np.testing.assert_array_equal(made.triangles, short.triangles)
+    assert np.abs(made.sky_visibility - short.sky_visibility).mean() < 0.02
+
+
+def test_what_panes_mirror_is_looked_up_in_the_straight_street(
+    short: City, photographs: Photographs
+) -> None:
+    """A bend of nearly nothing is drawn by other shaders, and looks the same."""
+    drive = plan_drive(2, 3.0, WIDTH, HEIGHT)
+    pictures = []
+    for which in (short, _bent(short, Bend(2.0, 10.0, 1e-7))):
+        with CityStage(which, photographs, WIDTH, HEIGHT) as stage:
+            pictures.append(stage.shoot(drive.intrinsics[0], drive.poses[0, 1]).radiance)
+    assert np.abs(pictures[0] - pictures[1]).mean() < 1e-4
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 0.02).mean() < 2e-3
+
+
+@pytest.mark.parametrize("bend", [STRAIGHT, Bend(2.0, 10.0, 0.3)])
+def test_depth_and_poles_are_those_of_rays(
+    short: City, photographs: Photographs, bend: Bend
+) -> None:
+    if bend.angle:
+        short = _bent(short, bend)
+    drive = plan_drive(4, 3.0, WIDTH, HEIGHT, bend=bend)
     k, pose = drive.intrinsics[0], moved_left(drive.poses[2, 1], 0.4)
     with CityStage(short, photographs, WIDTH, HEIGHT) as stage:
         shot = stage.shoot(k, pose, labels=True)
