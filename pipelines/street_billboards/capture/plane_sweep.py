@@ -153,9 +153,7 @@ def _labels(
     flat = np.stack([np.concatenate([one.ravel() for one in each]) for each in pyramids])
     ratios = np.arange(int(_MOST_RATIO * _STEPS) + 2) / _STEPS + 0.5 / _STEPS
     level = np.abs(np.log(ratios)[:, None] - np.log(_SCALES)[None]).argmin(axis=1)
-    costs = _sweep(
-        census(small), flat, starts, shapes, level, (height, width), turns, shifts, _LABELS
-    )
+    costs = _sweep(census(small), flat, starts, shapes, level, (height, width), turns, shifts)
     return semi_global_labels(costs, small)
 
 
@@ -177,10 +175,10 @@ def _sweep(
     size: tuple[int, int],
     turns: Map,
     shifts: Map,
-    labels: int,
 ) -> NDArray[np.uint8]:
     """Costs (h, w, labels), twice the bits that differ, of census (h, w) of ours and theirs."""
     rows, columns = ours.shape
+    labels = _LABELS
     height, width = size
     across, down = np.float32(width / columns), np.float32(height / rows)
     others = len(theirs)
