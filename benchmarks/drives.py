@@ -14,8 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from benchmarks import drives_depth, drives_film, drives_worlds
 from benchmarks.written_drives import format_mismatches
 
@@ -48,26 +46,12 @@ def _formats() -> dict[str, Any]:
 
 def _real_film(folder: Path) -> dict[str, Any]:
     """The same drive from its pictures alone, beside the poses that it has."""
-    from pipelines.street_billboards.poses.found_poses import find_poses, guessed_pinhole
-
     drive = drives_depth.kitti_frames(folder)
-    pictures = [drive.load(frame).photographs[0] for frame in range(len(drive.poses))]
-    height, width = pictures[0].shape[:2]
-    start = time.process_time()
-    found = find_poses(pictures, guessed_pinhole(width, height))
-    used = time.process_time() - start
-    kept = found.registered
-    truth = drive.poses[kept, 0, :3, 3]
-    focal = float(drive.load(0).intrinsics[0, 0, 0])
-    ahead = np.linspace(0.0, 1.0, int(kept.sum()))[:, None] * [1.0, 0.0, 0.0]
-    return {
-        "real_registered": float(kept.mean()),
-        "real_ate_m": drives_film.trajectory_error(found.poses[kept, :3, 3], truth),
-        "real_ate_m_null": drives_film.trajectory_error(ahead, truth),
-        "real_focal_error": float(found.intrinsics[0, 0]) / focal - 1.0,
-        "real_focal_deviation": found.focal_deviation / focal,
-        "real_poses_s_per_frame": used / len(pictures),
-    }
+    frames = [drive.load(frame) for frame in range(len(drive.poses))]
+    pictures = (frame.photographs[0] for frame in frames)
+    return drives_film.found_figures(
+        pictures, drive.poses[:, 0], frames[0].intrinsics[0], "real_film"
+    )
 
 
 def _timed(name: str, part: Callable[[], dict[str, Any]]) -> dict[str, Any]:
