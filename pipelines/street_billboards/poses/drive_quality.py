@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.street_billboards.poses.features import match_features, sift_features
-from pipelines.street_billboards.poses.found_poses import FoundPoses, find_poses, focal_sentence
+from pipelines.street_billboards.poses.found_poses import (
+    TOLD,
+    FoundPoses,
+    find_poses,
+    focal_sentence,
+)
 from pipelines.street_billboards.poses.frame_choice import median_parallax
 from pipelines.street_billboards.poses.mapping import Pinhole
 
@@ -21,8 +26,6 @@ ENOUGH_POINTS = 60
 ENOUGH_FRAMES = 20
 ENOUGH_PARALLAX = 0.004
 """Of the picture's width, median, from frame to frame."""
-TOLD = 0.05
-"""Relative deviation of a focal length that is well enough known."""
 
 
 class DriveQuality(NamedTuple):
