@@ -153,9 +153,7 @@ def _labels(
     flat = np.stack([np.concatenate([one.ravel() for one in each]) for each in pyramids])
     ratios = np.arange(int(_MOST_RATIO * _STEPS) + 2) / _STEPS + 0.5 / _STEPS
     level = np.abs(np.log(ratios)[:, None] - np.log(_SCALES)[None]).argmin(axis=1)
-    costs = _sweep(
-        census(small), flat, starts, shapes, level, (height, width), turns, shifts, _LABELS
-    )
+    costs = _sweep(census(small), flat, starts, shapes, level, (height, width), turns, shifts)
     return semi_global_labels(costs, small)
 
 
@@ -177,15 +175,14 @@ def _sweep(
     size: tuple[int, int],
     turns: Map,
     shifts: Map,
-    labels: int,
 ) -> NDArray[np.uint8]:
     """Costs (h, w, labels), twice the bits that differ, of census (h, w) of ours and theirs."""
     rows, columns = ours.shape
     height, width = size
     across, down = np.float32(width / columns), np.float32(height / rows)
     others = len(theirs)
-    costs = np.empty((rows, columns, labels), np.uint8)
-    each = np.empty((others, labels), np.uint8)
+    costs = np.empty((rows, columns, _LABELS), np.uint8)
+    each = np.empty((others, _LABELS), np.uint8)
     half, one = np.float32(0.5), np.float32(1.0)
     for y in range(rows):
         fy = (np.float32(y) + half) * down - half
@@ -197,7 +194,7 @@ def _sweep(
                 u0 = turn[0, 0] * fx + turn[0, 1] * fy + turn[0, 2]
                 v0 = turn[1, 0] * fx + turn[1, 1] * fy + turn[1, 2]
                 w0 = turn[2, 0] * fx + turn[2, 1] * fy + turn[2, 2]
-                for label in range(labels):
+                for label in range(_LABELS):
                     d = np.float32(label)
                     ratio = w0 + d * shift[2]
                     each[k, label] = _UNSEEN
