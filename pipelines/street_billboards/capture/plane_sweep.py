@@ -182,8 +182,8 @@ def _sweep(
     height, width = size
     across, down = np.float32(width / columns), np.float32(height / rows)
     others = len(theirs)
-    costs = np.empty((rows, columns, labels), np.uint8)
-    each = np.empty((others, labels), np.uint8)
+    costs = np.empty((rows, columns, _LABELS), np.uint8)
+    each = np.empty((others, _LABELS), np.uint8)
     half, one = np.float32(0.5), np.float32(1.0)
     for y in range(rows):
         fy = (np.float32(y) + half) * down - half
@@ -195,7 +195,7 @@ def _sweep(
                 u0 = turn[0, 0] * fx + turn[0, 1] * fy + turn[0, 2]
                 v0 = turn[1, 0] * fx + turn[1, 1] * fy + turn[1, 2]
                 w0 = turn[2, 0] * fx + turn[2, 1] * fy + turn[2, 2]
-                for label in range(labels):
+                for label in range(_LABELS):
                     d = np.float32(label)
                     ratio = w0 + d * shift[2]
                     each[k, label] = _UNSEEN

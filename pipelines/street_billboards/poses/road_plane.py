@@ -23,6 +23,7 @@ _ON_PLANE = 0.04
 """Of the cameras' height: points within it are on the road."""
 _LEAST_POINTS = 30
 _LEAST_SHARE = 0.25
+_NEARLY = 0.8
 _TILTED = 0.9
 """Cosine between the road's normal and the cameras' up, at least."""
 
@@ -65,7 +66,9 @@ def find_road(
 
 
 def _plane(points: FloatArray, up: FloatArray, generator: np.random.Generator) -> Road | None:
-    best, inside = 0, np.zeros(len(points), bool)
+    """The lowest of the planes that hold nearly as many points as the best: pavements have more
+    texture than the road, and lie a kerb above it."""
+    planes = []
     for _ in range(_TRIALS):
         one, two, three = points[generator.choice(len(points), 3, replace=False)]
         normal = np.cross(two - one, three - one)
@@ -77,10 +80,11 @@ def _plane(points: FloatArray, up: FloatArray, generator: np.random.Generator) -
         if normal @ up < _TILTED or height <= 0:
             continue
         near = np.abs(points @ normal + height) < _ON_PLANE * height
-        if near.sum() > best:
-            best, inside = int(near.sum()), near
+        planes.append((int(near.sum()), height, near))
+    best = max((count for count, _, _ in planes), default=0)
     if best < max(_LEAST_POINTS, _LEAST_SHARE * len(points)):
         return None
+    _, _, inside = max((one for one in planes if one[0] >= _NEARLY * best), key=lambda one: one[1])
     middle = points[inside].mean(axis=0)
     normal = np.linalg.svd(points[inside] - middle, full_matrices=False)[2][2]
     normal *= np.sign(normal @ up)

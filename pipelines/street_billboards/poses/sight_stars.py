@@ -19,8 +19,8 @@ View = tuple[int, int]
 """Frame and camera."""
 
 _FEATURES = 1500
-_KEPT = 200
-"""Features of a star at most: those that most photographs show."""
+_KEPT, _BANDS = 240, 4
+"""Features of a star at most, and bands of its picture that have as many each."""
 _RATIO = 0.8
 """Of the best match's distance to the second best's (Lowe 2004), at most."""
 _OFF_LINE = 1.0
@@ -82,11 +82,21 @@ def find_stars(
                 _matched(pixels, descriptors, *features(frame)[other]) for frame, other in others
             ]
             shown = np.stack(seen, axis=1) if seen else np.full((len(pixels), 0, 2), np.nan)
-            sights_each = np.isfinite(shown[..., 0]).sum(axis=1)
-            most = np.argsort(-sights_each, kind="stable")[:_KEPT]
-            most = most[sights_each[most] >= 2]
-            stars.append(Star(own, others, pixels[most], shown[most]))
+            rows = _most_seen(pixels[:, 1], np.isfinite(shown[..., 0]).sum(axis=1))
+            stars.append(Star(own, others, pixels[rows], shown[rows]))
     return stars
+
+
+def _most_seen(height: FloatArray, sights_each: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Features that most photographs show, two at least, from each band of the picture: the road
+    has few."""
+    kept = []
+    edges = np.linspace(height.min(initial=0), height.max(initial=0), _BANDS + 1)[1:-1]
+    band = np.searchsorted(edges, height)
+    for number in range(_BANDS):
+        rows = np.flatnonzero((band == number) & (sights_each >= 2))
+        kept.append(rows[np.argsort(-sights_each[rows], kind="stable")][: _KEPT // _BANDS])
+    return np.concatenate(kept)
 
 
 def _features(

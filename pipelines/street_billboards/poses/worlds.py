@@ -32,10 +32,12 @@ FloatArray = NDArray[np.float64]
 _WINDOWS, _LENGTH = 4, 4
 """Places along the drive that are looked at, and frames of each."""
 _LEAST_SIGHTS = 200
-_GOOD = 0.7
-"""Share of the sights that right poses confirm."""
+_GOOD = 0.55
+"""Share of the sights that right poses confirm, be they off by centimetres; others a third."""
 _SURELY = 0.85
 """Share that they confirm where no other reading is asked about."""
+_ROUGH_STARS = 3
+"""That all readings are compared by, before the likely ones are by all."""
 _BETTER, _EQUAL = 0.15, 0.05
 """Of it: how much more another reading has to confirm, and what two that are as good may differ."""
 _AS_EXACT = 1.1
@@ -197,7 +199,11 @@ def _best_reading(
     share = _confirmed(stars, given.poses, intrinsics)
     if share >= _SURELY:
         return given.poses, []
-    scores = [(_confirmed(stars, one.poses, intrinsics), one) for one in readings]
+    few = stars[:: max(len(stars) // _ROUGH_STARS, 1)]
+    rough = [(_confirmed(few, one.poses, intrinsics), one) for one in readings]
+    least = max(score for score, _ in rough) - 2 * _BETTER
+    likely = [one for score, one in rough if score >= least]
+    scores = [(_confirmed(stars, one.poses, intrinsics), one) for one in likely]
     best = max(score for score, _ in scores)
     if share >= best - _BETTER:
         return given.poses, []
