@@ -178,7 +178,6 @@ def _sweep(
 ) -> NDArray[np.uint8]:
     """Costs (h, w, labels), twice the bits that differ, of census (h, w) of ours and theirs."""
     rows, columns = ours.shape
-    labels = _LABELS
     height, width = size
     across, down = np.float32(width / columns), np.float32(height / rows)
     others = len(theirs)
