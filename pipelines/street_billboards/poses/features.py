@@ -19,6 +19,8 @@ _CELLS = (12, 4)
 _RATIO = 0.8
 """Lowe's: the best match is nearer by this than the next best."""
 _CONTRAST = 0.01
+_LARGEST = 1280
+"""Pixels of the longer side."""
 
 
 class Features(NamedTuple):
@@ -36,7 +38,8 @@ def sift_features(
     """SIFT features of a picture (h, w) or (h, w, 3) uint8, spread over it.
 
     mask (h, w): False where none is wanted (the bonnet). At most ``most``: the strongest of each
-    part of the picture, so that a tree does not take all of them.
+    part of the picture, so that a tree does not take all of them. They are looked for in a picture
+    of at most 1280 pixels across: finer ones take memory and seconds, and are noise of the film.
 
     >>> found = sift_features(np.zeros((60, 80), np.uint8))
     >>> found.places.shape, found.descriptors.shape
@@ -45,6 +48,11 @@ def sift_features(
     import cv2
 
     grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+    scale = max(1.0, max(picture.shape[:2]) / _LARGEST)
+    if scale > 1.0:
+        size = round(grey.shape[1] / scale), round(grey.shape[0] / scale)
+        grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+        mask = None if mask is None else cv2.resize(mask.astype(np.uint8), size) > 0
     sift = cv2.SIFT.create(contrastThreshold=_CONTRAST, enable_precise_upscale=True)
     allowed = None if mask is None else mask.astype(np.uint8)
     points = _spread(sift.detect(grey, allowed), (grey.shape[1], grey.shape[0]), most)
@@ -53,7 +61,8 @@ def sift_features(
     kept, descriptors = sift.compute(grey, points)
     places = np.array([point.pt for point in kept], np.float32)
     shares = descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9)
-    return Features(places, np.sqrt(shares))
+    by_axis = np.array([picture.shape[1] / grey.shape[1], picture.shape[0] / grey.shape[0]])
+    return Features(((places + 0.5) * by_axis - 0.5).astype(np.float32), np.sqrt(shares))
 
 
 def _spread(points: Any, size: tuple[int, int], most: int) -> list[Any]:

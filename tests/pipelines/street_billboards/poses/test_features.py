@@ -46,6 +46,17 @@ def test_a_moved_picture_is_matched_where_it_went(wall: NDArray[np.uint8]) -> No
         assert len(np.unique(column)) == len(rows)
 
 
+def test_large_pictures_are_looked_at_smaller(wall: NDArray[np.uint8]) -> None:
+    """Every pixel eight times across and down, of which every second line is kept."""
+    large = np.kron(wall, np.ones((8, 8), np.uint8))
+    found = sift_features(large, most=400).places
+    direct = sift_features(np.kron(wall, np.ones((4, 4), np.uint8)), most=400).places
+    np.testing.assert_allclose(found, (direct + 0.5) * 2 - 0.5, atol=1e-3)
+    mask = np.ones(large.shape, np.bool_)
+    mask[:, :1200] = False
+    assert (sift_features(large, mask, 400).places[:, 0] >= 1198).all()
+
+
 def test_other_pictures_match_hardly(wall: NDArray[np.uint8]) -> None:
     noise = np.random.default_rng(0).integers(0, 255, wall.shape).astype(np.uint8)
     here, there = sift_features(wall), sift_features(noise)
