@@ -256,7 +256,13 @@ def _read(drive: Drive, truth: Drive, stars: list[Star]) -> World:
             camera_height=CAMERA_HEIGHT,
         )
     check_rigid(drive.poses)
-    return read_world(stars, drive.poses, drive.intrinsics, camera_height=CAMERA_HEIGHT)
+    return read_world(
+        stars,
+        drive.poses,
+        drive.intrinsics,
+        camera_height=CAMERA_HEIGHT,
+        load=lambda frame: drive.photographs[frame],
+    )
 
 
 def as_given(case: Case) -> World:

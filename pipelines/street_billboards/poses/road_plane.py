@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.street_billboards.capture.plane_sweep import Photograph, sweep_depth
 from pipelines.street_billboards.poses.sight_stars import Star, sights
 
 FloatArray = NDArray[np.float64]
@@ -18,10 +19,16 @@ _STEEP = 0.15
 """Tangent below the horizon from which on a ray may meet the road nearby."""
 _ASIDE = 2.0
 """Of a point's depth below the camera: how far aside it may be."""
+_LANE = 0.8
+"""The same where every pixel has its depth: no kerb."""
+_AROUND, _EVERY = 3, 4
+"""Frames before and after one, and pixels from one that is asked to the next."""
+_NEAREST, _FARTHEST = 0.8, 15.0
+"""Steps from frame to frame between which the road is looked for."""
 _TRIALS = 600
 _ON_PLANE = 0.04
 """Of the cameras' height: points within it are on the road."""
-_LEAST_POINTS = 30
+_LEAST_POINTS = 20
 _LEAST_SHARE = 0.25
 _NEARLY = 0.8
 _TILTED = 0.9
@@ -63,6 +70,35 @@ def find_road(
     if len(points) < _LEAST_POINTS:
         return None
     return _plane(points, up, np.random.default_rng(seed))
+
+
+def sweep_road(
+    load: Callable[[int], NDArray[np.uint8]], poses: FloatArray, intrinsics: FloatArray
+) -> Road | None:
+    """The same of the depths of every pixel: asphalt has few features.
+
+    load: photographs (c, h, w, 3) of a frame. Of the first camera, at two places of the drive, by
+    ``plane_sweep`` with what is around them.
+    """
+    step = float(np.median(np.linalg.norm(np.diff(poses[:, 0, :3, 3], axis=0), axis=1)))
+    below, ups = [], []
+    for frame in sorted({len(poses) // 3, 2 * len(poses) // 3}):
+        around = range(max(frame - _AROUND, 0), min(frame + _AROUND + 1, len(poses)))
+        shown = {n: Photograph(load(n)[0], intrinsics[0], poses[n, 0]) for n in around}
+        own = shown.pop(frame)
+        reach = {"nearest": _NEAREST * step, "farthest": _FARTHEST * step}
+        depth = sweep_depth(own, list(shown.values()), **reach).depth[::_EVERY, ::_EVERY]
+        rows, columns = np.indices(depth.shape) * _EVERY
+        rays = np.stack([columns, rows, np.ones_like(rows)], axis=-1)
+        rays = rays @ np.linalg.inv(intrinsics[0]).T
+        kept = np.isfinite(depth) & (rays[..., 1] > _STEEP)
+        kept &= np.abs(rays[..., 0]) < _LANE * rays[..., 1]
+        below.append((rays[kept] * depth[kept, None]) @ own.pose[:3, :3].T)
+        ups.append(-own.pose[:3, 1])
+    points, up = np.concatenate(below), np.mean(ups, axis=0)
+    if len(points) < _LEAST_POINTS:
+        return None
+    return _plane(points, up / np.linalg.norm(up), np.random.default_rng(0))
 
 
 def _plane(points: FloatArray, up: FloatArray, generator: np.random.Generator) -> Road | None:

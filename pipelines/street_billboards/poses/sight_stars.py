@@ -51,6 +51,8 @@ class Sights(NamedTuple):
     """(n,), 1 / unit of the poses, along the camera's axis; nan where it cannot be told."""
     residual: FloatArray
     """(n, k), pixels; nan where there is no sight."""
+    elsewhen: NDArray[np.bool_]
+    """(k,), which of the photographs are of another instant."""
 
 
 def find_stars(
@@ -88,13 +90,12 @@ def find_stars(
 
 
 def _most_seen(height: FloatArray, sights_each: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Features that most photographs show, two at least, from each band of the picture: the road
-    has few."""
+    """Features that most others show, one at least, from each band: the road has few."""
     kept = []
     edges = np.linspace(height.min(initial=0), height.max(initial=0), _BANDS + 1)[1:-1]
     band = np.searchsorted(edges, height)
     for number in range(_BANDS):
-        rows = np.flatnonzero((band == number) & (sights_each >= 2))
+        rows = np.flatnonzero((band == number) & (sights_each >= 1))
         kept.append(rows[np.argsort(-sights_each[rows], kind="stable")][: _KEPT // _BANDS])
     return np.concatenate(kept)
 
@@ -167,19 +168,22 @@ def sights(star: Star, poses: FloatArray, intrinsics: FloatArray) -> Sights:
         residual = np.where(at[..., 2] > 0, off, np.inf)
         residual = np.where(known, residual, np.nan)
         weight = np.where(known, 1.0 / np.maximum(np.nan_to_num(off, nan=1e6), _USUAL), 0.0)
-    return Sights(inverse, residual)
+    elsewhen = np.array([other != frame for other, _ in star.others], bool)
+    return Sights(inverse, residual, elsewhen)
 
 
 def confirmed_share(found: Sequence[Sights], pixels: float = 2.0) -> float:
-    """Share of the sights that lie within so many pixels of where poses have them, in front.
+    """Share of the sights at other instants that lie within so many pixels of where poses have them.
 
-    A point that has to be behind its own camera is confirmed by none. 0 without sights.
+    A point that has to be behind its own camera is confirmed by none. 0 without sights. What a
+    rig's cameras see at one instant says nothing of the way.
     """
     good = asked = 0
     for one in found:
-        known = ~np.isnan(one.residual)
+        residual = one.residual[:, one.elsewhen]
+        known = ~np.isnan(residual)
         before = (one.inverse_depth > 0)[:, None]
-        good += int((known & before & (one.residual < pixels)).sum())
+        good += int((known & before & (residual < pixels)).sum())
         asked += int(known.sum())
     return good / asked if asked else 0.0
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.street_billboards.poses.road_plane import Road, find_road
+from pipelines.street_billboards.poses.road_plane import Road, find_road, sweep_road
 from pipelines.street_billboards.poses.sight_stars import (
     Star,
     confirmed_share,
@@ -105,7 +105,12 @@ def right_world(
     order = along_the_way(poses[:, 0, :3, 3])
     stars = find_stars(lambda frame: load(int(order[frame])), windows(len(poses)))
     found = read_world(
-        stars, poses[order], intrinsics, camera_height=camera_height, is_metric=is_metric
+        stars,
+        poses[order],
+        intrinsics,
+        camera_height=camera_height,
+        is_metric=is_metric,
+        load=lambda frame: load(int(order[frame])),
     )
     if np.array_equal(order, np.arange(len(poses))):
         return found
@@ -120,17 +125,26 @@ def read_world(
     *,
     camera_height: float,
     is_metric: bool = False,
+    load: Callable[[int], NDArray[np.uint8]] | None = None,
 ) -> World:
-    """``right_world`` from what photographs share (``sight_stars.find_stars``)."""
-    if sum(int(np.isfinite(star.seen[..., 0]).sum()) for star in stars) < _LEAST_SIGHTS:
+    """``right_world`` from what photographs share (``sight_stars.find_stars``).
+
+    load: as there, in the order of the poses; without, the road is told by shared features alone.
+    """
+    shared = [
+        np.isfinite(star.seen[:, [other != star.view[0] for other, _ in star.others], 0]).sum()
+        for star in stars
+    ]
+    if sum(shared) < _LEAST_SIGHTS:
         raise ValueError(
-            "The photographs share too few features to compare the poses with; expected "
-            "neighbouring frames to show the same things."
+            "Neighbouring photographs share too few features to compare the poses with; expected "
+            "them to show the same things: they are in another order than the poses, too far "
+            "apart, or blank."
         )
     read, notes = _best_reading(stars, poses, intrinsics)
     lens, more = _right_focal(stars, read, intrinsics)
     _check_confirmed(stars, read, lens)
-    road = find_road(stars, read, lens)
+    road = find_road(stars, read, lens) if load is None else sweep_road(load, read, lens)
     upright, turned = _upright(read, road)
     scaled, unit = (upright, []) if is_metric else in_metres(upright, road, camera_height)
     return World(scaled, lens, np.arange(len(poses)), (*notes, *more, *turned, *unit))
@@ -225,7 +239,7 @@ def _check_confirmed(stars: Sequence[Star], poses: FloatArray, intrinsics: Float
         return
     reason = (
         "they are off by some pixels each, so adjust them or give better ones"
-        if confirmed_share(found, _NEARLY) >= _GOOD
+        if confirmed_share(found, _NEARLY) >= _SURELY
         else "the photographs are in another order than the poses or of another drive, or the "
         "lenses are far off"
     )
