@@ -173,10 +173,10 @@ def sights(star: Star, poses: FloatArray, intrinsics: FloatArray) -> Sights:
 
 
 def confirmed_share(found: Sequence[Sights], pixels: float = 2.0) -> float:
-    """Share of the sights at other instants that lie within so many pixels of where poses have them.
+    """Share of the sights at other instants that lie this near to where the poses have them.
 
-    A point that has to be behind its own camera is confirmed by none. 0 without sights. What a
-    rig's cameras see at one instant says nothing of the way.
+    In pixels. A point that has to be behind its own camera is confirmed by none; what a rig's
+    cameras see at one instant says nothing of the way. 0 without sights.
     """
     good = asked = 0
     for one in found:
