@@ -90,12 +90,12 @@ def find_stars(
 
 
 def _most_seen(height: FloatArray, sights_each: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Features that most others show, one at least, from each band: the road has few."""
+    """Features that most others show, two at least, from each band: the road has few."""
     kept = []
     edges = np.linspace(height.min(initial=0), height.max(initial=0), _BANDS + 1)[1:-1]
     band = np.searchsorted(edges, height)
     for number in range(_BANDS):
-        rows = np.flatnonzero((band == number) & (sights_each >= 1))
+        rows = np.flatnonzero((band == number) & (sights_each >= 2))
         kept.append(rows[np.argsort(-sights_each[rows], kind="stable")][: _KEPT // _BANDS])
     return np.concatenate(kept)
 
