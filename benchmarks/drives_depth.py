@@ -192,7 +192,7 @@ def kitti_frames(folder: Path) -> DriveFrames:
     """A drive in the layout of KITTI's odometry, its world turned to z up."""
     import cv2
 
-    lens = np.loadtxt(folder / "calib.txt")[0].reshape(3, 4)[:, :3]
+    lens = np.atleast_2d(np.loadtxt(folder / "calib.txt"))[0].reshape(3, 4)[:, :3]
     # Of the first camera: x right, y down, z forward; the world's are x forward, y left, z up.
     upright = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     rows = np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)

@@ -80,11 +80,11 @@ def sweep_depth(
     moves on its own is not told from what stands still: see ``drive_depth``. Raises ValueError
     without other photographs.
 
-    >>> picture = np.random.default_rng(0).integers(0, 255, (64, 96, 3), np.uint8)
-    >>> lens = np.array([[80.0, 0, 47.5], [0, 80, 31.5], [0, 0, 1]])
+    >>> picture = np.random.default_rng(0).integers(0, 255, (64, 192, 3), np.uint8)
+    >>> lens = np.array([[200.0, 0, 95.5], [0, 200, 31.5], [0, 0, 1]])
     >>> beside = np.eye(4)
-    >>> beside[0, 3] = 0.5  # a wall at 5 m is seen 8 pixels to the left from there
-    >>> moved = Photograph(np.roll(picture, -8, axis=1), lens, beside)
+    >>> beside[0, 3] = 1.0  # a wall at 5 m is seen 40 pixels to the left from there
+    >>> moved = Photograph(np.roll(picture, -40, axis=1), lens, beside)
     >>> found = sweep_depth(Photograph(picture, lens, np.eye(4)), [moved])
     >>> round(float(np.nanmedian(found.depth)), 1)
     5.0

@@ -164,9 +164,10 @@ STAGES: list[tuple[str, dict[str, Any]]] = [
     ("street", _STREET | {"TINT_TILES": 0}),
     ("decoded_tiles", {"COLUMNS": 12}),
     *(
-        ("city", _CITY | {"GLOSS": gloss, "STAINED": stained})
+        ("city", _CITY | {"GLOSS": gloss, "STAINED": stained, "BENT": bent})
         for gloss in (True, False)
         for stained in (True, False)
+        for bent in (True, False)
     ),
 ]
 """Shaders of the stage with values for all names in capitals."""
