@@ -70,7 +70,7 @@ def _drives() -> list[str]:
         "",
         "## Drives",
         "",
-        "A folder; its format is found from the files in it, the first of these that there is.",
+        "A film, or a folder: its format is found from the files in it, the first that there is.",
         "",
         "| format | known by | what is read |",
         "|---|---|---|",

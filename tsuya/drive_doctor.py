@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from assets_defs.street_billboards.given_poses import agreement, world_of
-from assets_defs.street_billboards.unposed import camera_of, pictures_of
+from assets_defs.street_billboards.unposed import camera_of, check_one_camera, pictures_of
 from storage.readers.drives import Drive, read_drive
 from tsuya.doctor import Finding
 
@@ -55,6 +55,7 @@ def _unposed(drive: Drive, focal: float | None) -> list[Finding]:
     from pipelines.street_billboards.poses.drive_quality import FRAMES, drive_quality
     from pipelines.street_billboards.poses.frame_choice import choose_frames
 
+    check_one_camera(drive, drive.file.name)
     count = len(drive.times)
     first = max((count - _LOOKED_AT) // 2, 0)
     pictures = pictures_of(drive, np.arange(first, min(first + _LOOKED_AT, count)))

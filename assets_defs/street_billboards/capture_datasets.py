@@ -38,17 +38,13 @@ class PosePoints(NamedTuple):
     """(p, 3), metres."""
     colours: NDArray[np.uint8]
     """(p, 3), sRGB."""
-    distortion: NDArray[np.float64]
-    """(c, 5), OpenCV's; 0 where the reader has taken out what is known."""
     focal_deviation: NDArray[np.float64]
     """(c,), pixels; 0 where the focal length was given."""
 
 
 def _nothing_found(cameras: int) -> PosePoints:
     """Of a drive whose poses are given."""
-    return PosePoints(
-        np.empty((0, 3)), np.empty((0, 3), np.uint8), np.zeros((cameras, 5)), np.zeros(cameras)
-    )
+    return PosePoints(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.zeros(cameras))
 
 
 def stacked_by_frame(
@@ -97,7 +93,6 @@ def poses_dataset(
         {
             "poses": (("frame", "camera", "row_4", "column_4"), poses),
             "intrinsics": (("camera", "row", "column"), intrinsics),
-            "distortion": (("camera", "coefficient"), found.distortion),
             "size": (("side",), np.array(size, np.int64)),
             "instant": (("frame",), np.arange(frames) if instant is None else instant),
             "origin": (("axis",), np.zeros(3) if origin is None else origin),

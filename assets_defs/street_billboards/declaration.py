@@ -9,6 +9,7 @@ import numpy as np
 
 from assets_defs.sources import Source
 from assets_defs.street_billboards.given_poses import agreement, world_of
+from assets_defs.street_billboards.unposed import check_one_camera
 from assets_defs.system import Dimension, System
 from storage.readers.drives import read_drive
 from storage.readers.films import SUFFIXES as FILM_SUFFIXES
@@ -26,7 +27,10 @@ def _check_drive(source: Source, settings: Mapping[str, Any]) -> None:
         return
     drive = read_drive(source.path)
     is_first = "camera_height" in settings  # those of `drive_poses`
-    if not is_first or np.isnan(drive.poses).any():
+    if not is_first:
+        return
+    if np.isnan(drive.poses).any():
+        check_one_camera(drive, source.name)
         return
     try:
         world = world_of(drive, np.arange(len(drive.times)), settings["camera_height"])

@@ -108,10 +108,10 @@ def _taken_in(drive: Drive, poses: xr.Dataset) -> Result:
     from pipelines.street_billboards.capture.held_out import held_out
 
     lenses, size = poses["intrinsics"].values, (drive.width, drive.height)
-    distortion, instants = poses["distortion"].values, poses["instant"].values
+    instants = poses["instant"].values
 
     def taken(frame: int) -> NDArray[np.uint8]:
-        return centre_photographs(read_frame(drive, frame), lenses, distortion)
+        return centre_photographs(read_frame(drive, frame), lenses)
 
     shape = (len(drive.cameras), drive.height, drive.width)
     photographs = stacked_by_frame(taken, instants, ((*shape, 3), np.uint8))

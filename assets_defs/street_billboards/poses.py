@@ -137,9 +137,7 @@ def _found(
         progress=progress,
     )
     size = drive.width, drive.height
-    found = PosePoints(
-        film.points, film.colours, np.zeros((1, 5)), np.array([film.focal_deviation])
-    )
+    found = PosePoints(film.points, film.colours, np.array([film.focal_deviation]))
     dataset = poses_dataset(
         film.poses[:, None], film.intrinsics[None], size, instant=film.frames, found=found
     )

@@ -17,6 +17,15 @@ if TYPE_CHECKING:
     from pipelines.street_billboards.poses.mapping import Pinhole
 
 
+def check_one_camera(drive: Drive, name: str) -> None:
+    """Raise ValueError for a drive of several cameras without poses: those of one are found."""
+    if len(drive.cameras) > 1:
+        raise ValueError(
+            f"{name}: has {len(drive.cameras)} cameras and no poses; expected poses, or one "
+            "camera: give the folder of one camera's photographs."
+        )
+
+
 def camera_of(drive: Drive, focal: float | None) -> Pinhole:
     """What is known of a drive's one camera: the focal length asked for, or the files'."""
     from pipelines.street_billboards.poses.found_poses import guessed_pinhole

@@ -25,7 +25,7 @@ def used_pixels(drive: Drive, poses: xr.Dataset) -> Callable[[int], NDArray[np.b
         return None
     shape = (len(drive.cameras), drive.height, drive.width)
     always = poses["used"].values if "used" in poses else np.ones(shape, np.bool_)
-    lenses, distortion = poses["intrinsics"].values, poses["distortion"].values
+    lenses = poses["intrinsics"].values
 
     def used(instant: int) -> NDArray[np.bool_]:
         from pipelines.street_billboards.capture.centred_photographs import centre_photographs
@@ -34,6 +34,6 @@ def used_pixels(drive: Drive, poses: xr.Dataset) -> Callable[[int], NDArray[np.b
         whole = always if own is None else always & own
         whole = whole & drive.present[instant][:, None, None]
         codes = np.repeat(whole[..., None].astype(np.uint8) * 255, 3, axis=3)
-        return centre_photographs(codes, lenses, distortion)[..., 0] > 127
+        return centre_photographs(codes, lenses)[..., 0] > 127
 
     return used

@@ -19,12 +19,6 @@ DRIVE_POSES = Schema(
         "intrinsics": Variable(
             ("camera", "row", "column"), "float64", "pixel", "K of the photographs as they are"
         ),
-        "distortion": Variable(
-            ("camera", "coefficient"),
-            "float64",
-            "1",
-            "k1, k2, p1, p2, k3 as OpenCV has them, of photographs that are still distorted",
-        ),
         "size": Variable(("side",), "int64", "pixel", "Width and height of the photographs"),
         "instant": Variable(("frame",), "int64", "1", "Which of the drive's own instants"),
         "origin": Variable(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -34,3 +35,16 @@ def test_what_is_no_drive_is_refused(tmp_path: Path) -> None:
     (tmp_path / "film.mp4").write_bytes(b"no film at all, whatever its name says")
     with pytest.raises(BadInput, match=r"film\.mp4"):
         examine_drive(tmp_path / "film.mp4")
+
+
+def test_several_cameras_without_poses_are_refused(tmp_path: Path) -> None:
+    for camera in ("image_0", "image_1"):
+        (tmp_path / "drive" / camera).mkdir(parents=True)
+        for number in range(4):
+            picture = np.full((40, 60), 30 * number, np.uint8)
+            assert cv2.imwrite(str(tmp_path / "drive" / camera / f"{number:06d}.png"), picture)
+    rows = [f"P{number}: 50 0 30 {-20 * number} 0 50 20 0 0 0 1 0" for number in range(2)]
+    (tmp_path / "drive" / "calib.txt").write_text("\n".join(rows))
+    found = examine_drive(tmp_path / "drive")[-1]
+    assert not found.met
+    assert "has 2 cameras and no poses; expected poses, or one camera" in found.found

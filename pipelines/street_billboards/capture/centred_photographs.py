@@ -18,27 +18,25 @@ def centred_intrinsics(
 
 
 def centre_photographs(
-    photographs: NDArray[np.uint8],
-    intrinsics: NDArray[np.float64],
-    distortion: NDArray[np.float64] | None = None,
+    photographs: NDArray[np.uint8], intrinsics: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
     """Photographs (c, y, x, 3) of cameras with K (c, 3, 3), taken anew with ``centred_intrinsics``.
 
-    distortion: (c, 5) OpenCV's k1, k2, p1, p2, k3, if it is still in them. Those that are centred
-    already and not distorted come back as they are.
+    Those that have it already come back as they are.
     """
     import cv2
 
     _, height, width, _ = photographs.shape
     made = photographs.copy()
-    bends = np.zeros((len(intrinsics), 5)) if distortion is None else distortion
-    for number, (lens, bent) in enumerate(zip(intrinsics, bends, strict=True)):
+    for number, lens in enumerate(intrinsics):
         wanted = centred_intrinsics(lens, width, height)
-        if bent.any() or not np.allclose(wanted, lens, rtol=0, atol=1e-6):
-            x, y = cv2.initUndistortRectifyMap(
-                lens, bent, np.eye(3), wanted, (width, height), cv2.CV_32FC1
-            )
-            made[number] = cv2.remap(
-                photographs[number], x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+        if not np.allclose(wanted, lens, rtol=0, atol=1e-6):
+            turn = wanted @ np.linalg.inv(lens)
+            made[number] = cv2.warpPerspective(
+                photographs[number],
+                turn,
+                (width, height),
+                flags=cv2.INTER_CUBIC,
+                borderMode=cv2.BORDER_REPLICATE,
             )
     return made
