@@ -19,6 +19,8 @@ CAMERA_HEIGHT = 1.5
 """Metres above the road, of a camera behind a windscreen."""
 _TILTED = 25.0
 """Degrees by which the road may be inclined to the camera's own level."""
+_CLIMBING = 3.0
+"""Degrees between the road and the way that is driven on it."""
 _TRIALS = 2000
 _BAND = 0.04
 """Of the camera's height: how far off the plane a point of the road may be."""
@@ -50,12 +52,13 @@ def road_below(
 
     poses (f, 4, 4) camera to world, nan where there is none; points (n, 3); nearest (n,), the frame
     nearest to each. Each point is put into the axes of its nearest camera, so that all of the drive
-    shows one piece of road, hills or not. Raises ValueError where no plane lies below.
+    shows one piece of road, hills or not. A car drives along the road: a plane that the way leads
+    into or out of is none, however many points lie in it. Raises ValueError where no plane lies below.
     """
     away = points - poses[nearest, :3, 3]
     own = np.einsum("nji,nj->ni", poses[nearest, :3, :3], away)
     low = np.flatnonzero((own[:, 1] > 0) & (own[:, 2] > 0))
-    plane = _ransac(own[low], np.random.default_rng(seed))
+    plane = _ransac(own[low], _way(poses), np.random.default_rng(seed))
     if plane is None:
         raise ValueError(
             "scale: found no road below the cameras; expected sparse points of it, or a track or "
@@ -157,31 +160,45 @@ def _earth_centred(places: FloatArray) -> FloatArray:
     return np.column_stack([level * np.cos(east), level * np.sin(east), up])
 
 
-def _ransac(low: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, float] | None:
-    """Normal and height of the plane below with most points; None where there is none."""
+def _way(poses: FloatArray) -> FloatArray:
+    """(3,), of length 1: which way the car drives, in its camera's axes, median of its steps."""
+    known = poses[np.isfinite(poses[:, 0, 0])]
+    steps = np.einsum("fji,fj->fi", known[:-1, :3, :3], np.diff(known[:, :3, 3], axis=0))
+    lengths = np.linalg.norm(steps, axis=1, keepdims=True)
+    way = np.median(steps[lengths[:, 0] > 0] / lengths[lengths[:, 0] > 0], axis=0)
+    return np.asarray(way / np.linalg.norm(way))
+
+
+def _ransac(
+    low: FloatArray, way: FloatArray, generator: np.random.Generator
+) -> tuple[FloatArray, float] | None:
+    """Normal and height of the plane below along a way with most points; None where there is
+    none."""
     if len(low) < _FEWEST:
         return None
     best: tuple[FloatArray, float] | None = None
     most = _FEWEST - 1
     for _ in range(_TRIALS):
-        plane = _through(low[generator.choice(len(low), 3, replace=False)])
+        plane = _through(low[generator.choice(len(low), 3, replace=False)], way)
         if plane is not None and (count := int(_on_plane(low, *plane).sum())) > most:
             most, best = count, plane
     for _ in range(5 if best is not None else 0):
-        fitted = _through(low[_on_plane(low, *best)])  # type: ignore[misc]
+        fitted = _through(low[_on_plane(low, *best)], way)  # type: ignore[misc]
         if fitted is None or _on_plane(low, *fitted).sum() < _FEWEST:
             break
         best = fitted
     return best
 
 
-def _through(points: FloatArray) -> tuple[FloatArray, float] | None:
-    """The plane nearest to points (k, 3): its normal upwards and the camera's height above it."""
+def _through(points: FloatArray, way: FloatArray) -> tuple[FloatArray, float] | None:
+    """The plane nearest to points (k, 3): its normal upwards and the camera's height above it;
+    None where it is none that is driven on."""
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
     normal = -normal * np.sign(normal[1] or 1.0)
     height = float(-normal @ middle)
-    if height <= 0 or -normal[1] < np.cos(np.radians(_TILTED)):
+    climbs = abs(float(normal @ way)) > np.sin(np.radians(_CLIMBING))
+    if height <= 0 or climbs or -normal[1] < np.cos(np.radians(_TILTED)):
         return None
     return normal, height
 

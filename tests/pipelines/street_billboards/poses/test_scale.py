@@ -131,3 +131,18 @@ def test_metres_of_degrees_are_those_of_the_ellipsoid() -> None:
     assert metres[1, 2] == 10.0
     assert metres[2, 0] == pytest.approx(1314.2, abs=0.5)
     assert np.isnan(metres[2, 2])
+
+
+def test_a_plane_that_the_way_leads_out_of_is_no_road() -> None:
+    """More points lie on a slope that goes down ahead than on the road."""
+    random = np.random.default_rng(5)
+    frames = 20
+    poses = np.tile(np.eye(4), (frames, 1, 1))
+    poses[:, 2, 3] = np.arange(frames)
+    nearest = random.integers(0, frames, 2400)
+    across, ahead = random.uniform(-2, 2, 2400), random.uniform(3, 20, 2400)
+    is_road = np.arange(2400) < 600
+    down = np.where(is_road, 1.5, 2.6 + 0.25 * ahead) + random.normal(0, 0.005, 2400)
+    points = np.column_stack([across, down, ahead + nearest])
+    heights = [road_below(poses, points, nearest, seed=seed).height for seed in range(4)]
+    np.testing.assert_allclose(heights, 1.5, atol=0.03)
