@@ -53,7 +53,8 @@ def road_below(
     poses (f, 4, 4) camera to world, nan where there is none; points (n, 3); nearest (n,), the frame
     nearest to each. Each point is put into the axes of its nearest camera, so that all of the drive
     shows one piece of road, hills or not. A car drives along the road: a plane that the way leads
-    into or out of is none, however many points lie in it. Raises ValueError where no plane lies below.
+    into or out of is none, however many points lie in it. Raises ValueError where no plane lies
+    below.
     """
     away = points - poses[nearest, :3, 3]
     own = np.einsum("nji,nj->ni", poses[nearest, :3, :3], away)
